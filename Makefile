@@ -4,6 +4,7 @@ INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --con
 STAMP := .venv/installed
 COMPILED := .venv/compiled
 KERNELS := solver/rolling/kernels.py solver/fatigue/kernels.py
+OWN := examples/own_back_stress.py:examples/own_curve.py:examples/own_friction.py:examples/own_yield_surface.py
 DENO = DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 
 # Python keeps what it has compiled, whatever the caller says: tests and studies start many processes.
@@ -55,6 +56,7 @@ bench: setup ## draw CPU time against error
 stress: setup ## run a thousand seeded scenes, and see that none is answered wrongly (20 minutes)
 	$(BIN)/python -m tests.stability.estimates 39
 	$(BIN)/python -m tests.stability
+	RESIDUA_PARTS=$(OWN) $(BIN)/python -m tests.stability.slopes
 
 stress-service: setup ## put the service under stress, and see what it stands (15 minutes)
 	$(BIN)/python -m tests.stress

@@ -218,6 +218,8 @@ class Converged:
     lost : difference between the beginning of this increment and the end of the previous one
     windows : for each part, the region of the window in which it was solved; None without
     beside : the same increment of the neighbouring runs (`solver.derivatives`), if there are any
+    near : of a neighbouring run, the nearest switch since the path began, in differences of its
+        parameter: see `solver.derivatives.switches`
     """
 
     start: State
@@ -240,3 +242,4 @@ class Converged:
     lost: float = 0.0
     windows: tuple[Region | None, ...] = ()
     beside: tuple[Converged, ...] = ()
+    near: float = np.inf

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from annotated_types import Unit
 
 from solver.errors import ModelError
@@ -23,6 +24,10 @@ gaps of a contact are small differences of them."""
 _SHARE = 0.3
 """Time of a neighbouring run over that of the run: .15 on a punch of standard and .3 of draft
 accuracy, .7 on a ball, whose surface turns."""
+
+
+_AT_A_SWITCH = 1e-5
+"""Relative change of a parameter: derivatives that hold for less may differ on both sides of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +54,7 @@ class Derivatives:
         return [named(of, by) for by in self.by for of in self.of]
 
     def quantities(self, kind: Any, known: Mapping[str, Quantity]) -> list[Quantity]:
-        """Return the declarations of the derivatives, ``d_<result>_d_<parameter>``.
+        """Return the declarations of ``d_<result>_d_<parameter>`` and of their ranges.
 
         Parameters
         ----------
@@ -77,7 +82,7 @@ class Derivatives:
                     raise ModelError(f"{field}[{k}]", name, f"must be {what} with decimals")
                 if name in given[:k]:
                     raise ModelError(f"{field}[{k}]", name, "is there already")
-        return [
+        derived = [
             replace(
                 known[of],
                 name=named(of, by),
@@ -88,6 +93,15 @@ class Derivatives:
             for by in self.by
             for of in self.of
         ]
+        holds = "relative change of {} up to which its derivatives hold, at most 1"
+        return derived + [Quantity(name=reach(by), long_name=holds.format(by)) for by in self.by]
+
+    def notes(self, values: Mapping[Quantity, Any]) -> list[str]:
+        """Return what a user must know of the values of a run."""
+        there = {q.name: value for q, value in values.items() if not np.isnan(value).all()}
+        lacks = [name for name in self.names if name not in there]
+        notes = [f"no derivative was found for {', '.join(lacks)}"] if lacks else []
+        return notes + at_switches({by: there[reach(by)] for by in self.by if reach(by) in there})
 
     def steps(self, parameters: Any, moving: Collection[str]) -> dict[str, float]:
         """Return the difference of each parameter that is not zero.
@@ -110,6 +124,21 @@ class Derivatives:
 def named(of: str, by: str) -> str:
     """Return the name of the derivative of a result by a parameter."""
     return f"d_{of}_d_{by}"
+
+
+def reach(by: str) -> str:
+    """Return the name of the range in which the derivatives by a parameter hold."""
+    return f"derivative_range_{by}"
+
+
+def at_switches(ranges: Mapping[str, float]) -> list[str]:
+    """Return warnings of parameters whose derivatives hold in such a small range only."""
+    return [
+        f"derivatives by {by} may be one-sided: a relative change of {least:.1e} decides "
+        "whether a point yields, touches, sticks or slides"
+        for by, least in ranges.items()
+        if least < _AT_A_SWITCH
+    ]
 
 
 def _marks(hint: Any) -> Iterator[Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.contact.state import Converged
 from solver.contact.system import System
-from solver.derivatives.asked import Derivatives, named
+from solver.derivatives.asked import Derivatives, named, reach
 from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
 from solver.loading.program import Program
@@ -19,10 +19,10 @@ from solver.results.quantities import QUANTITIES
 from solver.results.run import FinishedRun, Output, Values
 from solver.results.samples import Samples
 
-_JUMP = 100.0
-"""Relative change of a number over that of a parameter: above this ratio it is a jump, as of the
-place of a maximum that two places share. It has no derivative. Changes of a line or a map are
-relative to its largest value."""
+_JUMP = 1e-3
+"""Change of a number over the number, above which it jumps, as the place of a maximum that two
+places share does. It has no derivative. Changes of a line or a map are relative to its largest
+value."""
 
 
 class Family:
@@ -115,14 +115,17 @@ class Family:
     def values(
         self, watched: Sequence[Sequence[Any]], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the derivatives of results of a run, given its outputs.
+        """Return the derivatives of results of a run, given its outputs, and their ranges.
 
         They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
         a line or a map they are those at places of equal number, which may move: the derivatives of
         its coordinates say how.
         """
         steps, found = self._steps(run.parameters), dict[str, Any]()
+        shares = {by: abs(step / getattr(run.parameters, by)) for by, step in steps.items()}
         runs = self.finished(run, watched)
+        for (by, share), other in zip(shares.items(), runs[1:], strict=False):
+            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
         for output in (_coordinates, *outputs) if runs else ():
             first = _numbers(output(runs[0]))
             wanted = [name for name in self._asked.of if name in first]
@@ -132,8 +135,7 @@ class Family:
                 after = _numbers(output(other))
                 for of in wanted:
                     level, values = np.abs(first[of]), np.asarray(after.get(of, np.nan))
-                    share = abs(step / getattr(run.parameters, by))
-                    most = _JUMP * share * np.nanmax(level, initial=0.0)
+                    most = _JUMP * np.nan_to_num(level).max(initial=0.0)
                     change = values - first[of]
                     found[named(of, by)] = np.where(np.abs(change) > most, np.nan, change / step)
         lacks = {q.name: np.nan for q in self._declared if not q.dims}

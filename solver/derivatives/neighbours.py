@@ -30,6 +30,7 @@ import numpy as np
 
 from solver.contact.state import Converged, State
 from solver.contact.system import System
+from solver.derivatives.switches import distances, nearest
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.operators import Operator
@@ -92,8 +93,9 @@ class NeighbouringRuns:
             state = last.state if last else system.initial()
             if balanced is not None:
                 increment = Increment(system, state, state.time, contact=False)
-                state = system.at_rest(increment.linearised(balanced, operators).state)
-            out.append(stepper.rest(placed(system, state, at)).now)
+                state = system.at_rest(increment.linearised(balanced, operators)[0].state)
+            now = stepper.rest(placed(system, state, at)).now
+            out.append(replace(now, near=last.near) if last else now)
         return tuple(out)
 
     def again(self, beside: Sequence[Converged], time: float) -> tuple[Converged, ...]:
@@ -109,12 +111,16 @@ class NeighbouringRuns:
         try:
             with one_thread():
                 operators = [_Shared(operator) for operator in self._system.tangents(now)]
-                return tuple(
+                found = [
                     _next(stepper.system, own, at, now, operators, friction=friction)
                     for stepper, own, at in each
-                )
+                ]
         except (IncrementFailed, Singular):
             return ()
+        return tuple(
+            replace(own, near=min(last.near, nearest(found[0][1], away)))
+            for last, (own, away) in zip(before.beside, found, strict=False)
+        )
 
 
 def _check_alike(name: str, system: System, other: System) -> None:
@@ -157,8 +163,8 @@ def _next(
     operators: Sequence[Operator],
     *,
     friction: bool,
-) -> Converged:
-    """Return the next increment of a neighbour, given that of the run."""
+) -> tuple[Converged, Array]:
+    """Return the next increment of a neighbour, given that of the run, and its `distances`."""
     increment = Increment(
         system,
         _started(system, before.state, run.start),
@@ -166,8 +172,9 @@ def _next(
         contact=not run.separated,
         friction=friction,
     )
-    now = increment.linearised(run, operators)
-    return replace(now, energy=worked(system, before, now, run.energy.scale))
+    now, candidates = increment.linearised(run, operators)
+    now = replace(now, energy=worked(system, before, now, run.energy.scale))
+    return now, distances(system, now, candidates)
 
 
 def _started(system: System, own: State, run: State) -> State:

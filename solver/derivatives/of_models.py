@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from solver.derivatives.asked import STEP
+from solver.derivatives.asked import STEP, at_switches
 from solver.errors import ModelError, NotConverged
 from solver.model.model import Model
 from solver.parameters import is_number
 from solver.results.solution import Solution, solve
 from solver.typing import Array
+
+_LOG = logging.getLogger(__name__)
 
 
 def derive(
@@ -22,7 +25,8 @@ def derive(
     """Return the derivatives of a result of a model by the numbers from which it is made.
 
     The model is solved once. Its derivatives follow increment by increment, through plastic flow,
-    contact and friction: see `solver.derivatives.neighbours`.
+    contact and friction: see `solver.derivatives.neighbours`. A warning is logged if they may be
+    one-sided: see `solver.derivatives.switches`.
 
     Parameters
     ----------
@@ -49,6 +53,10 @@ def derive(
     found = solve(make(**at), beside=beside, **how).beside
     if not found:
         raise NotConverged("an increment of the derivatives has no solution")
+    ends = [list(each.stages.values())[-1] for each in found[1:]]
+    ranges = {name: abs(STEP) * end.near for name, end in zip(at, ends, strict=True)}
+    for note in at_switches(ranges):
+        _LOG.warning("%s", note)
     result, *others = map(of, found)
     return {
         name: (other - result) / (STEP * value)

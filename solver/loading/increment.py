@@ -174,8 +174,10 @@ class Increment:
         with one_thread():
             return self._iterate()
 
-    def linearised(self, end: Converged, operators: Sequence[Operator]) -> Converged:
-        """Return the increment after Newton steps from the end of an almost equal increment.
+    def linearised(
+        self, end: Converged, operators: Sequence[Operator]
+    ) -> tuple[Converged, Candidates]:
+        """Return the increment after Newton steps from an almost equal one, and its contact.
 
         The first step begins where the difference between the starts of the two leads. It suffices
         where no point begins or ceases to flow on the way, and the tangent is exact: it has no
@@ -237,7 +239,7 @@ class Increment:
                 pivoted=0,
                 blended=0,
             )
-            return self._commit(found, end.timing)
+            return self._commit(found, end.timing), candidates
 
     def _iterate(self) -> Balanced:
         tolerances = self.tolerances

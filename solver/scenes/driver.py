@@ -8,8 +8,6 @@ from functools import partial
 from itertools import tee
 from typing import Any
 
-import numpy as np
-
 from solver.audit.figures import AUDIT
 from solver.audit.pairs import untouched
 from solver.audit.report import Audit, audit
@@ -50,9 +48,7 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     if run.derived is not None and scene.derivatives is not None:
         derived = run.derived(run, scene.outputs)
         values |= derived
-        there = {q.name for q, value in derived.items() if not np.isnan(value).all()}
-        if lacks := [name for name in scene.derivatives.names if name not in there]:
-            own = (*own, f"no derivative was found for {', '.join(lacks)}")
+        own = (*own, *scene.derivatives.notes(derived))
     if check.violations:
         status = Status.AUDIT_FAILED
     messages = run.doubts + check.violations + check.outside + run.notes + check.warnings + own

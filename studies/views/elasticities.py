@@ -8,7 +8,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from solver.derivatives.asked import named
+from solver.typing import Array
 
 
 def derived(names: Collection[str], parameters: Iterable[str]) -> Iterator[tuple[str, str]]:
@@ -19,18 +22,20 @@ def derived(names: Collection[str], parameters: Iterable[str]) -> Iterator[tuple
 
 
 def elasticities(
-    scalars: Mapping[str, Any], parameters: Mapping[str, Any]
-) -> dict[str, dict[str, float]]:
-    """Return the elasticities of the numbers of a run: by number, by parameter.
+    values: Mapping[str, Any], parameters: Mapping[str, Any]
+) -> dict[str, dict[str, Array]]:
+    """Return the elasticities of the numbers of runs that are known: by number, by parameter.
 
     Parameters
     ----------
-    scalars : numbers and derivatives by name; None where one is not known
-    parameters : of the run
+    values : numbers and derivatives by name, of a run or of several; None where one is not known
+    parameters : of the runs
     """
-    found: dict[str, dict[str, float]] = {}
-    for of, by in derived(scalars, parameters):
-        value, slope = scalars[of], scalars[named(of, by)]
-        if value and slope is not None:
-            found.setdefault(of, {})[by] = slope * parameters[by] / value
+    found: dict[str, dict[str, Array]] = {}
+    for of, by in derived(values, parameters):
+        if values[of] is not None and values[named(of, by)] is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                each = np.ravel(np.divide(values[named(of, by)] * parameters[by], values[of]))
+            if (known := each[np.isfinite(each)]).size:
+                found.setdefault(of, {})[by] = known
     return found

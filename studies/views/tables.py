@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, SupportsIndex
 import numpy as np
 import xarray as xr
 
-from solver.derivatives.asked import named
+from solver.derivatives.asked import named, reach
 from solver.errors import ModelError
 from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES
@@ -35,7 +35,7 @@ from studies.views.columns import (
     unit_text,
     value_text,
 )
-from studies.views.elasticities import derived
+from studies.views.elasticities import derived, elasticities
 from studies.views.figures import FIGURES, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.reading import open_study
@@ -186,7 +186,9 @@ def _own(dataset: xr.Dataset) -> list[str]:
     numbers = {str(n): v for n, v in dataset.data_vars.items() if v.dtype.kind in "fiub"}
     names = [name for name, each in numbers.items() if each.dims == rank]
     known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
-    known |= {named(*each) for each in _derived(dataset)}
+    parameters = [*_parameters(dataset), *map(str, dataset.coords)]
+    known |= {named(*each) for each in derived(_numbers(dataset), parameters)}
+    known |= {*map(reach, parameters)}
     own = [name for name in names if name not in known and not name.startswith(_AUDIT)]
     ends = {f"_{axis}" for axis in AXES}
     return [name for name in own if name[-2:] not in ends or name[:-2] not in own]
@@ -379,10 +381,9 @@ def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:
     return placed({name: dataset[name].to_numpy()[k] for name, k in several})
 
 
-def _derived(runs: xr.Dataset) -> list[tuple[str, str]]:
-    """Return each number and each parameter of which the runs have a derivative."""
-    numbers = [str(name) for name in runs if runs[name].dims == runs["status"].dims]
-    return list(derived(numbers, dict.fromkeys([*_parameters(runs), *map(str, runs.coords)])))
+def _numbers(runs: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return the variables of the runs that have one value for each."""
+    return {str(name): runs[name] for name in runs if runs[name].dims == runs["status"].dims}
 
 
 def elasticity_table(runs: xr.Dataset) -> str:
@@ -390,14 +391,10 @@ def elasticity_table(runs: xr.Dataset) -> str:
 
     Of several runs they are the median, and the least and the largest.
     """
-    fixed = _parameters(runs)
     cells: dict[str, dict[str, str]] = {}
-    for of, by in _derived(runs):
-        parameter = runs[by] if by in runs else fixed[by]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            each = (runs[named(of, by)] * parameter / runs[of]).values
-        known = each[np.isfinite(each)]
-        if known.size:
+    swept = {str(name): each for name, each in runs.coords.items()}
+    for of, row in elasticities(_numbers(runs), {**_parameters(runs), **swept}).items():
+        for by, known in row.items():
             least, median, most = np.quantile(known, [0.0, 0.5, 1.0])
             span = f" ({least:+.2f} to {most:+.2f})" if known.size > 1 else ""
             cells.setdefault(of, {})[by] = f"{median:+.2f}{span}"

@@ -17,7 +17,7 @@ from solver.errors import ModelError
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, fit, open_study
 from studies.definition.identity import solver_hash
-from studies.definition.quantity import Line
+from studies.definition.quantity import Line, Read
 from studies.definition.schema import Context, parsed
 from studies.definition.sweep import standings
 from studies.execution.asking import Asking
@@ -509,10 +509,16 @@ def test_derivatives_of_a_line_count_where_its_places_move_and_only_if_they_are_
         "d_surface_displacement_d_slope": Line(("stage", "s"), np.stack([x, 2.0 * x])),
     }
     # u = (3 + 2 h) X at s = (1 + 0.1 h) X
-    assert line.slope(given.get, "slope", 10.0) == pytest.approx(
+
+    def slopes(read: Read) -> np.ndarray:
+        seen, found = line.with_slopes(read, {"slope": 10.0}).T
+        assert np.array_equal(seen, line.seen(read))
+        return np.asarray(found)
+
+    assert slopes(given.get) == pytest.approx(
         10.0 * np.array([0.25, 0.5]) * (2.0 - 3.0 * 0.1), rel=1e-4
     )
-    assert np.isnan(line.slope({**given, "d_s_d_slope": None}.get, "slope", 10.0)).all()
+    assert np.isnan(slopes({**given, "d_s_d_slope": None}.get)).all()
     gap = np.stack([x, np.where(x == x[3], np.nan, 2.0 * x)])
     given["d_surface_displacement_d_slope"] = Line(("stage", "s"), gap)
-    assert np.isnan(line.slope(given.get, "slope", 10.0)).all()
+    assert np.isnan(slopes(given.get)).all()

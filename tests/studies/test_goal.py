@@ -16,8 +16,11 @@ import numpy as np
 import pytest
 
 from residua.cli import main
+from solver.derivatives.asked import named
 from solver.errors import ModelError
+from solver.results.quantities import Quantity
 from solver.results.record import Record
+from solver.scenes import Scene
 from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open_study, run_study
 from studies.definition.identity import solver_hash
 from studies.definition.neighbours import Neighbours
@@ -27,8 +30,10 @@ from studies.execution.result import answered
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
 from studies.kinds.goal.search import Goal, Search
+from studies.scenes.scene import read_scene
+from tests.marks import HERE
 from tests.studies.conftest import fake_study, results_of
-from tests.studies.fakes import FAKE, Canned, FakeParameters, Followed, numbers
+from tests.studies.fakes import FAKE, FOLLOWED, Canned, FakeParameters, Followed, numbers
 from tests.studies.killed import see_it_taken_up
 
 PRESSURE = {"of": "peak_contact_pressure", "at": 120.0, "between": [0.1, 4.0]}
@@ -94,7 +99,10 @@ def search_here(study: Study, store: Store, most: int = 10**6) -> list[str]:
 
 
 def searched(
-    goal: Goal, number: Callable[[float], float | None], expected: float | None = None
+    goal: Goal,
+    number: Callable[[float], float | None],
+    expected: float | None = None,
+    slope: Callable[[float], float] | None = None,
 ) -> Search:
     """Search with a function of the parameter; None stands for a limit load."""
     search = Search(goal, expected)
@@ -103,6 +111,7 @@ def searched(
         known = number(value)
         status = "limit_load" if known is None else "ok"
         scalars = {"peak_contact_pressure": known}
+        scalars |= {goal.slope("peak_contact_pressure"): slope(value)} if slope else {}
         search.tell(value, {"id": str(value), "status": status, "scalars": scalars, "message": ""})
     return search
 
@@ -129,6 +138,60 @@ def test_a_search_finds_its_value_with_no_more_runs_than_it_says(parameter: str,
         taken.append(len(found.rows))
     if (kind, parameter) == ("at", "friction"):
         assert np.mean(taken) < goal.most[1] - 2, "interpolation takes fewer runs than bisection"
+
+
+@pytest.mark.parametrize("kind", ["at", "first_above"])
+@pytest.mark.parametrize("scene", [FAKE, FOLLOWED])
+@pytest.mark.parametrize("parameter", ["load_ratio", "friction"])
+def test_slopes_save_runs_and_stay_within_the_most(parameter: str, scene: Scene, kind: str) -> None:
+    """A number that bends, and is flat below the goal for ``first_above``."""
+    random.seed(1)
+    asked = {"parameter": parameter, "of": "peak_contact_pressure", kind: 0.0}
+    asked |= {"within": 1e-3, "between": [0.1, 1.0]}
+    derivative = Quantity(name=named("peak_contact_pressure", parameter), long_name="")
+    goals = [
+        Goal.read(asked, each, {}) for each in (scene, replace(scene, quantities=(derivative,)))
+    ]
+    taken = np.zeros(2)
+    for _ in range(60):
+        root, bend = math.exp(random.uniform(math.log(0.1), 0.0)), random.uniform(-0.5, 0.5)
+
+        def flat(value: float, root: float = root) -> bool:
+            return kind == "first_above" and value < root
+
+        def number(value: float, root: float = root, bend: float = bend) -> float:
+            return 0.0 if flat(value) else (value - root) * (1.0 + bend * (value - root))
+
+        def slope(value: float, root: float = root, bend: float = bend) -> float:
+            return 0.0 if flat(value) else 1.0 + 2.0 * bend * (value - root)
+
+        for k, goal in enumerate(goals):
+            found = searched(goal, number, slope=slope if k else None)
+            assert found.reason == "passed"
+            assert found.low <= root <= found.high <= found.low / (1.0 - 1.001e-3)
+            assert len(found.rows) <= goal.most[1] and found.rounds <= goal.most[0]
+            taken[k] += len(found.rows)
+    if parameter == "friction":  # a run each, not several along a path
+        assert taken[1] < 2 / 3 * taken[0]
+    else:
+        assert taken[1] <= taken[0]
+
+
+@pytest.mark.solves
+def test_slopes_of_the_steady_strain_lead_to_the_shakedown_limit(store: Store) -> None:
+    """Bree's wall ratchets above a thermal stress of 4 (1 - 0.8); bisection takes 8 runs."""
+    content = {
+        "name": "shaken", "parameters": {"steady": 0.8},
+        "goal": {"parameter": "thermal", "find": "shakedown_limit", "between": [0.5, 4.5]},
+        "derivatives": {
+            "by": ["thermal"], "of": ["steady_plastic_increment", "steady_net_increment"],
+        },
+    }  # fmt: skip
+    limit = Study.from_dict(content, read_scene(HERE.parent / "data/scenes/bree.toml"))
+    run_study(limit, store, workers=0)
+    found = open_study(store.dataset_path(limit.id))
+    assert found["thermal"].item() == pytest.approx(0.8, rel=0.01)
+    assert found["runs"].item() <= 5
 
 
 def test_a_search_of_whole_numbers_ends_at_neighbours() -> None:

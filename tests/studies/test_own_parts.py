@@ -198,6 +198,12 @@ def test_a_yield_surface_of_ones_own_is_known_to_scenes_and_rolls(called: Called
 
 
 @pytest.mark.processes
+def test_a_shipped_scene_is_read_beside_parts_with_a_modulus(called: Called) -> None:
+    done = called(BOTH, RUN_ID)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.processes
 def test_ids_of_runs_follow_what_a_file_of_parts_computes(tmp_path: Path, called: Called) -> None:
     def run_id(text: str = "") -> str:
         own = tmp_path / "mine.py"

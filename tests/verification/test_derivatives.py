@@ -22,7 +22,10 @@ from solver import (
     derive,
     solve,
 )
-from solver.derivatives.asked import Derivatives
+from solver.contact.state import Converged
+from solver.contact.system import System
+from solver.derivatives.asked import STEP, Derivatives
+from solver.loading.walker import Walker
 from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, TrescaMaterial, Voce
 from solver.mesh import grid
 from solver.scenes import Scene
@@ -140,20 +143,24 @@ def compare(
         assert np.abs(value * found[name] - expected).max() < tolerance * size, name
 
 
-def pads(friction: float, modulus: float, pressure: float) -> Model:
-    """Two pads pressed together, the upper one wider on top, of a law with back stress."""
-    curve = Voce(yield_stress=200.0)
-    law = Chaboche(
-        elasticity=Elasticity(youngs_modulus=2e5, poisson_ratio=0.3),
-        curve=curve,
-        back_stresses=(ArmstrongFrederick(modulus=modulus, recall=100.0),),
+def pads(
+    friction: float, modulus: float, pressure: float, strength: float = 200.0, law: str = "recall"
+) -> Model:
+    """Two pads pressed together, the upper one wider on top."""
+    elasticity = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
+    back = (ArmstrongFrederick(modulus=modulus, recall=100.0),)
+    linear = Voce(yield_stress=strength, modulus=modulus)
+    material = (
+        TrescaMaterial(elasticity=elasticity, curve=linear)
+        if law == "tresca"
+        else Chaboche(elasticity=elasticity, curve=Voce(yield_stress=strength), back_stresses=back)
     )
     upper = Body(
-        name="upper", mesh=grid(np.linspace(0, 5, 6), np.linspace(0, 4, 4)), material=law,
+        name="upper", mesh=grid(np.linspace(0, 5, 6), np.linspace(0, 4, 4)), material=material,
         supports={"left": "x"}, pressure={"top": pressure},
     )  # fmt: skip
     lower = Body(
-        name="lower", mesh=grid(np.linspace(0, 10, 11), np.linspace(-8, 0, 5)), material=law,
+        name="lower", mesh=grid(np.linspace(0, 10, 11), np.linspace(-8, 0, 5)), material=material,
         supports={"left": "x", "bottom": "y"},
     )  # fmt: skip
     pair = ContactPair(slave=("upper", "bottom"), master=("lower", "top"), friction=friction)
@@ -226,6 +233,68 @@ def test_peak_pressure_of_a_roller_grows_with_the_root_of_its_force() -> None:
     scene = read_scene(HERE / "data/scenes/roller.toml")
     record = numbers(scene, scene.parameters(), ("load",), ("peak_pressure",))
     assert shares(record, "peak_pressure", ("load",)) == pytest.approx([0.5], abs=5e-3)
+
+
+def bar(strength: float, load: float) -> Model:
+    """A bar in tension; its stress is the load."""
+    material = Chaboche(
+        elasticity=STEEL, curve=Voce(yield_stress=strength, saturation=900.0, rate=9.0),
+        back_stresses=(),
+    )  # fmt: skip
+    body = Body(
+        name="bar", mesh=grid(np.linspace(0, 1, 2), np.linspace(0, 1, 2)), material=material,
+        kinematics="axisymmetric", supports={"bottom": "y"}, pressure={"top": -load},
+    )  # fmt: skip
+    return Model(bodies=(body,))
+
+
+@pytest.mark.parametrize("gap", [3e-4, 3e-6, -3e-6, -3e-4])
+def test_the_range_ends_where_a_bar_yields(gap: float, caplog: pytest.LogCaptureFixture) -> None:
+    """The fifth of ten increments ends by a share ``gap`` below yield."""
+    at, control = {"strength": 200.0, "load": 400.0 * (1 - gap)}, PathControl(load_step=0.1)
+    assert ranges(bar, at, control) == pytest.approx([abs(gap)] * 2, rel=2e-3)
+    derive(bar, at, lambda solution: 0.0, control=control)
+    assert [*caplog.messages] == [
+        f"derivatives by {name} may be one-sided: a relative change of 3.0e-06 decides "
+        "whether a point yields, touches, sticks or slides"
+        for name in (at if abs(gap) < 1e-5 else ())
+    ]
+
+
+@pytest.mark.parametrize("law", ["recall", "tresca"])
+def test_sets_hold_up_to_the_end_of_the_range_and_not_beyond(law: str) -> None:
+    def pressed(friction: float, strength: float, pressure: float) -> Model:
+        return pads(friction, 2e4, pressure, strength, law)
+
+    at = {"friction": 0.2, "strength": 200.0, "pressure": 320.0}
+    control = PathControl(load_step=0.25, unload_steps=2)
+    own = sets(pressed(**at), control)
+    for (name, value), share in zip(at.items(), ranges(pressed, at, control), strict=True):
+        assert 1e-5 < share < 0.02
+
+        def same(times: float, name: str = name, value: float = value * share) -> bool:
+            return sets(pressed(**{**at, name: at[name] + times * value}), control) == own
+
+        assert same(0.9) and same(-0.9), name
+        assert not (same(1.1) and same(-1.1)), name
+
+
+def ranges(make: Callable[..., Model], at: dict[str, float], control: PathControl) -> list[float]:
+    """Return for each parameter the relative change up to which sets hold."""
+    beside = {name: make(**{**at, name: value * (1 + STEP)}) for name, value in at.items()}
+    _, *found = solve(make(**at), beside=beside, control=control).beside
+    return [-STEP * each.unloaded.near for each in found]
+
+
+def sets(model: Model, control: PathControl) -> list[Any]:
+    """Return which points yield, and the states of contact vertices, at each increment."""
+
+    def watch(now: Converged) -> Any:
+        yields = [each.yielding.tolist() for each in now.responses]
+        return yields, [each.status.tolist() for each in now.state.contacts]
+
+    (outcome,) = Walker(System(model), control, watch=watch).walk([control.program(1.0)])
+    return list(outcome.history)
 
 
 def test_what_jumps_has_no_derivative_and_the_message_says_so() -> None:

@@ -199,14 +199,9 @@ class Fitting(Replayed):
         read = self.read(row)
         lines = [self.asked.measured[k] for k in self._of[key.position]]
         each = zip(self.asked.ranges.items(), key.values, strict=True)
-        free = [(name, of.slope(at)) for (name, of), at in each if self.asked.derived]
+        widths = {name: of.slope(at) for (name, of), at in each if self.asked.derived}
         try:
-            return [
-                np.column_stack(
-                    [line.seen(read), *(line.slope(read, by, width) for by, width in free)]
-                )
-                for line in lines
-            ]
+            return [line.with_slopes(read, widths) for line in lines]
         except ValueError as error:
             self.refusals[key] = str(error)
             return None

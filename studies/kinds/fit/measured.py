@@ -154,29 +154,38 @@ class MeasuredLine(StudyTable):
         known = scene.known_quantities
         return all(named(each, by) in known for each in {self.of, self.over} - {""})
 
-    def slope(self, read: Read, by: str, width: float) -> Array:
-        """Return the derivatives (n,) of `seen` by a parameter, times the width of its range.
+    def with_slopes(self, read: Read, widths: Mapping[str, float]) -> Array:
+        """Return `seen`, and its derivatives by parameters, times the widths of their ranges.
 
-        They are NaN if the run lacks one.
+        The columns (n, 1 + n_parameters) of derivatives that the run lacks are NaN.
 
         Raises
         ------
         ValueError
             as of `seen`
         """
-        step, lines = _STEP * width, dict[str, Line]()
+        columns = [self.seen(read)]
+        for by, width in widths.items():
+            lines = self._moved(read, by, _STEP * width)
+
+            def moved(name: str, own: Mapping[str, Line] = lines) -> Line | None:
+                return own.get(name) or read(name)
+
+            there = self.seen(moved) if lines else np.full(len(self.values), np.nan)
+            columns.append((there - columns[0]) / _STEP)
+        return np.column_stack(columns)
+
+    def _moved(self, read: Read, by: str, step: float) -> dict[str, Line]:
+        """Return the lines after a step of a parameter; none if one has no derivative."""
+        found = dict[str, Line]()
         for name in {self.of, self.over} - {""}:
             line, change = read(name), read(named(name, by))
             if line is None or change is None:
-                return np.full(len(self.values), math.nan)
+                return {}
             if not np.isfinite(change.values[np.isfinite(line.values)]).all():
-                return np.full(len(self.values), math.nan)
-            lines[name] = line._replace(values=line.values + step * change.values)
-
-        def moved(name: str) -> Line | None:
-            return lines.get(name) or read(name)
-
-        return np.asarray((self.seen(moved) - self.seen(read)) / _STEP)
+                return {}
+            found[name] = line._replace(values=line.values + step * change.values)
+        return found
 
     def seen(self, read: Read) -> Array:
         """Return what a run says at the places (n,).

@@ -6,10 +6,12 @@ search brackets this value and narrows the bracket. What it asks for next depend
 that it has asked for: a search that begins anew asks for the same runs, which are in the store.
 
 A round is one run: the middle of the bracket, or, for ``at``, the point of the method ITP
-(interpolate, truncate, project), which needs at most one run more than bisection. Where the bracket
-is halved, its first ends are taken on trust: one of them is computed only if the search comes to
-it. Where the goal at other places lets expect it (`studies.definition.neighbours`), such a search
-begins there, with a bracket that is narrow enough, and makes steps of doubled width if it missed.
+(interpolate, truncate, project), which needs at most one run more than bisection. If the runs have
+the derivative of the number by the parameter (`solver.derivatives`), it is beside the point of
+Newton's method. Where the bracket is halved, its first ends are taken on trust: one of them is
+computed only if the search comes to it. Where the goal at other places lets expect it
+(`studies.definition.neighbours`), such a search begins there, with a bracket that is narrow enough,
+and makes steps of doubled width if it missed; with slopes one step.
 
 Where the parameter is the branch of its scene, one loading path serves several values: it rises
 through a few values to the first one beyond. Where the path can go on from any of its states, it is
@@ -33,7 +35,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 from annotated_types import Interval
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
+from solver.derivatives.asked import named
 from solver.late import Late
+from solver.results.shakedown import ShakedownState
 from studies.definition.cases import Case
 from studies.definition.parameters import in_unit
 from studies.definition.place import Chooser
@@ -64,7 +68,8 @@ _KINDS = ("at", "first_above", "first_below")
 _PARTS = 4
 """Parts into which a round of a loading path divides the bracket."""
 _STEPS = 3
-"""Steps of a search that began where its goal was expected, before it halves what is left."""
+"""Steps of a search that began where its goal was expected, before it halves what is left; runs
+that slopes may take beyond those of bisection."""
 _ALONE, _NEAR = 3, 3
 """Number of searches that are expected to halve their whole bracket; runs of each of the others,
 which begin where their neighbours let expect the goal, and of interpolation besides both ends."""
@@ -72,6 +77,11 @@ _ROUNDING = 1.0001
 """Factor on the width of a narrow bracket, whose ends are rounded."""
 _SLACK = 1
 """Runs that ITP may take beyond those of bisection (n0 of the reference)."""
+_FASTER = 0.25
+"""Distance of the number from the threshold over that before a step of Newton's method: above this
+ratio the next step is one without slopes, unless the bracket was halved."""
+_SHAKEN = FOUND["shakedown_limit"]["of"], float(ShakedownState.ELASTIC_SHAKEDOWN), "first_above"
+"""The goal that is where numbers become 0 that have slopes: the steady increments of strain."""
 
 
 def _parameter(name: Any, info: ValidationInfo) -> str:
@@ -153,6 +163,7 @@ class Goal(Kind):
     between: Annotated[list[float], PlainValidator(_between, json_schema_input_type=Limits)]
     _branch: str = ""
     _goes_on: bool = False
+    _sloped: bool = False
 
     @model_validator(mode="before")
     @classmethod
@@ -178,7 +189,24 @@ class Goal(Kind):
             raise StudyError("", self.content, allowed)
         scene = Context.of(info).scene
         self._branch, self._goes_on = scene.branch, scene.goes_on
+        self._sloped = any(self.slope(of) in scene.known_quantities for of in self.leading[0])
         return self
+
+    @property
+    def leading(self) -> tuple[tuple[str, ...], float]:
+        """The numbers of which the first with a slope leads to the goal, and their value there."""
+        if (self.of, self.threshold, self.kind) == _SHAKEN:
+            return ("steady_plastic_increment", "steady_net_increment"), 0.0
+        return (self.of,), self.threshold
+
+    @property
+    def sloped(self) -> bool:
+        """Whether the runs have such a slope."""
+        return self._sloped
+
+    def slope(self, of: str) -> str:
+        """Return the name of the derivative of a number by the parameter."""
+        return named(of, self.parameter)
 
     @property
     def kind(self) -> str:
@@ -208,7 +236,7 @@ class Goal(Kind):
     @property
     def halves(self) -> bool:
         """Whether a search halves its bracket by single runs."""
-        return not self.branch and self.kind != "at"
+        return not self.branch and (self.kind != "at" or self._sloped)
 
     @property
     def parts(self) -> int:
@@ -250,7 +278,8 @@ class Goal(Kind):
         first = _PARTS if self.branch else 1
         width = (self.scaled(high) - self.scaled(low)) / first
         more = math.ceil(max(0.0, math.log(width / self.tolerance, self.parts) - 1e-9))
-        more += _SLACK if self.kind == "at" and self.parts == 2 else 0
+        slack = _SLACK if self.kind == "at" and self.parts == 2 else 0
+        more += _STEPS if self._sloped else slack
         return 1 + more, first + 1 + more * (self.parts - 1)
 
     @classmethod
@@ -272,7 +301,7 @@ class Goal(Kind):
     @property
     def expects(self) -> bool:
         """Whether a search begins where its neighbours let expect the goal."""
-        return self.halves
+        return self.halves and self.kind != "at"
 
     def most_runs(self, places: int) -> int:
         """Return the most runs of the searches at so many places."""
@@ -411,6 +440,7 @@ class Search(Chooser):
     refusal: str = ""
     _rising: bool | None = None
     _round: list[float] = field(default_factory=list)
+    _led_from: tuple[float, float] = math.inf, math.inf
 
     def __post_init__(self) -> None:
         low, high = self.goal.between
@@ -527,23 +557,26 @@ class Search(Chooser):
             self.reason = status if status in NO_EQUILIBRIUM else PASSED
         else:
             split = self.goal.split(self.low, self.high, self.goal.parts)
-            self._round = self._interpolated() or split
+            self._round = self._led(self.low, self.high) or self._interpolated() or split
         return True
 
     def _halved(self) -> list[float]:
         """Return the next value of a search that halves its bracket; none at its end."""
         goal, (first, last) = self.goal, self.goal.between
+        if goal.kind == "at" and not self.rows:
+            return [first]  # it decides whether the number rises
         low = first if math.isnan(self.low) else self.low
         high = last if math.isnan(self.high) else self.high
         if not goal.narrow(low, high):
-            return self._stepped(low, high) or goal.split(low, high, 2)
+            led = self._led(low, high)
+            return led or self._stepped(low, high) or goal.split(low, high, 2)
         ends = ((first, self.low), (last, self.high))
         return [end for end, known in ends if math.isnan(known) and end not in self.rows][:1]
 
     def _stepped(self, low: float, high: float) -> list[float]:
         """Return the first value where a goal is expected, or that of the next step from there."""
         goal, steps = self.goal, len(self.rows)
-        if self.expected is None or steps > _STEPS:
+        if self.expected is None or steps > (1 if goal.sloped else _STEPS):
             return []
         if not steps:
             inside = min(max(self.expected, low), high)
@@ -552,6 +585,32 @@ class Search(Chooser):
         if math.isnan(self.high):
             return goal.inside(low, high, [goal.scaled(low) + width])
         return goal.inside(low, high, [goal.scaled(high) - width]) if math.isnan(self.low) else []
+
+    def _led(self, low: float, high: float) -> list[float]:
+        """Return the next value beside the point of Newton's method; none where it is not used.
+
+        It is below this point by half of the tolerance, and an end of a narrow bracket if the point
+        is in it: if it is exact, two runs are enough. Steps that hardly come nearer are left to the
+        other methods, and those after which there might not be enough rounds.
+        """
+        goal, (names, aim), points = self.goal, self.goal.leading, []
+        for value in (self.low, self.high):
+            scalars = self.rows[value]["scalars"] if value in self.rows else {}
+            for number, slope in ((scalars.get(of), scalars.get(goal.slope(of))) for of in names):
+                if number is not None and slope and number != aim:
+                    points.append((abs(number - aim), value - (number - aim) / slope))
+                    break
+        a, b, width = goal.scaled(low), goal.scaled(high), goal.tolerance
+        (off, wide), self._led_from = self._led_from, (math.inf, math.inf)
+        inside = [each for each in points if low < each[1] < high]
+        if not inside or (min(inside)[0] > _FASTER * off and b - a > wide / 2.0):
+            return []
+        self._led_from, point = (min(inside)[0], b - a), goal.scaled(min(inside)[1])
+        beside = a + width if point < a + width else point - width / 2.0
+        value = b - width if point > b - width else beside
+        left = goal.most[0] - self.rounds - 2 - int(goal.halves)
+        fits = math.log(max(value - a, b - value) / width, goal.parts) <= left + 1e-9
+        return goal.inside(low, high, [value]) if fits else []
 
     def _over(self, value: float) -> float | None:
         """Return how far the number of a run is from the threshold, positive beyond it."""
