@@ -7,8 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from solver import Body, ContactPair, Material, Model
-from solver.contact.geometry import pair
-from solver.contact.normals import end_normals
+from solver.contact.geometry import end_normals, pair
 from solver.contact.system import System
 from solver.mesh import grid
 

@@ -12,7 +12,7 @@ from residua import commands, keys
 from residua.status import BAD_INPUT, complain
 from solver.version import __version__
 from studies.errors import StudyError
-from studies.execution.limits import Limits
+from studies.execution.executor import Limits
 from studies.storage.blobs import directory_of, is_address
 
 

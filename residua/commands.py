@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     """Compute a study, print its runs and draw one of them."""
     from residua.progress import ALONE, Foreseen, Progress, dry_run
     from studies.execution.access import Access
-    from studies.execution.limits import Limits
+    from studies.execution.executor import Limits
     from studies.execution.run import StudyEvent, run_study
     from studies.kinds.fit.fitting import NO_FIT, Fit
     from studies.storage.store import Store
@@ -168,10 +168,9 @@ def scenes(options: argparse.Namespace) -> int:
 
 def draw(options: argparse.Namespace) -> int:
     """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts."""
-    from studies.views.doubts import doubts_of
     from studies.views.plots.setup import setup_figure
     from studies.views.plots.sheets import resolved
-    from studies.views.scene_tables import described_scene
+    from studies.views.scene_tables import described_scene, doubts_of
 
     scene, values = described_scene(options.what, _selection(options.set, "--set"))
     for doubt in doubts_of(scene, values):
@@ -356,7 +355,7 @@ def export(options: argparse.Namespace) -> int:
 def _written_nodes(run: Any, folder: Path) -> Path:
     """Write the fields at the nodes of a run (a data set), and return the file that lists them."""
     from solver.errors import ModelError
-    from solver.results.export import write_vtu
+    from solver.results.mesh_fields import write_vtu
     from studies.views.solution import read
 
     try:

@@ -17,7 +17,7 @@ from studies.execution.run import StudyEvent
 from studies.storage.store import Store
 from studies.toml import CASE
 from studies.views.columns import counted, value_text
-from studies.views.doubts import doubts_of
+from studies.views.scene_tables import doubts_of
 from studies.views.summary import bar
 
 _REDRAW = 0.1

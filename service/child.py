@@ -16,7 +16,7 @@ from service.processes import Outlet, beat, claim_stdout, read_order, watch_stdi
 from studies.definition.study import Study
 from studies.errors import CatalogueDamaged, GridLost, StoreBusy, StoreFull, StudyError, Unusable
 from studies.execution.access import Access
-from studies.execution.limits import Limits
+from studies.execution.executor import Limits
 from studies.execution.run import StudyEvent, run_study
 from studies.storage.store import Store
 

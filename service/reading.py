@@ -15,7 +15,7 @@ from typing import Any
 import xarray as xr
 
 from service.octets import octets
-from solver.results.export import vtu_of
+from solver.results.mesh_fields import vtu_of
 from studies.definition.study import Study
 from studies.errors import StudyError
 from studies.kinds import found_of

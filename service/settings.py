@@ -14,7 +14,7 @@ from solver.memory import most_kept
 from studies.errors import StudyError
 from studies.execution.access import Access
 from studies.execution.estimate import Bounds
-from studies.execution.limits import Limits
+from studies.execution.executor import Limits
 from studies.scenes.refusals import mistakes_of
 from studies.storage.blobs import directory_of
 

@@ -20,7 +20,7 @@ _HOMES = {
     "FileDamaged": "errors",
     "fit": "kinds.fit.shown",
     "GridLost": "errors",
-    "Limits": "execution.limits",
+    "Limits": "execution.executor",
     "LoadingPath": "definition.cases",
     "open_netcdf": "views.reading",
     "open_study": "views.reading",

@@ -42,8 +42,7 @@ from solver.contact.candidates import no_candidates
 from solver.contact.state import Converged, State
 from solver.contact.system import System
 from solver.fem.discretisation import Discretisation
-from solver.fem.frame import turning
-from solver.fem.rigid import RigidPart
+from solver.fem.rigid import RigidPart, turning
 from solver.fem.substructure import Substructure
 from solver.linear.schur import Eliminated
 from solver.loading.step import newton_step

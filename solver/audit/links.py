@@ -14,12 +14,11 @@ import numpy as np
 from solver.audit.plain import LEAST, LEAST_ENERGY
 from solver.contact.state import Converged
 from solver.contact.system import System
-from solver.fem.dofs import vectors
-from solver.fem.frame import RigidMotion
-from solver.fem.rigid import RigidPart
+from solver.fem.nodes import vectors
+from solver.fem.rigid import RigidMotion, RigidPart
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.model.link import Link, Side
+from solver.model.pairs import Link, Side
 from solver.typing import Array
 
 _PIECES = 16

@@ -7,13 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.audit.bodies import AuditedBody, misplaced
-from solver.audit.contact_error import contact_error
+from solver.audit.bodies import (
+    AuditedBody,
+    action_reaction,
+    imbalance,
+    imbalance_released,
+    misplaced,
+    reactions,
+)
 from solver.audit.figures import LIMITS
-from solver.audit.forces import action_reaction, imbalance, imbalance_released, reactions
 from solver.audit.large_strain import large_strain
 from solver.audit.links import least_energy, links_error, turned
-from solver.audit.pairs import AuditedPair
+from solver.audit.pairs import AuditedPair, contact_error
 from solver.audit.plain import LEAST, PlainBody
 from solver.audit.theory import accumulated_strain, elastic_strain, plastic_strain
 from solver.contact.pressure import contact_pressure

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.audit.plain import load_factor
-from solver.contact.normals import is_curved
+from solver.contact.geometry import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.contact.state import State
 from solver.contact.system import System
-from solver.fem.dofs import vectors
+from solver.fem.nodes import vectors
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import Surface
 from solver.fem.wheel import Wheel
 from solver.mesh.edges import shape_derivatives, shape_functions
-from solver.model.contact_pair import ContactPair
+from solver.model.pairs import ContactPair
 from solver.typing import Array, Bools, Ints
 
 _XI, _WEIGHT = np.polynomial.legendre.leggauss(4)

@@ -1,24 +1,31 @@
-"""Contact pairs on the parts of a system."""
+"""Contact pairs on the parts of a system; which of their sides is the slave.
+
+Contact forces need displacements of the same resolution. A rigid body has no displacement unknowns
+at its vertices: it is the slave only if its edges are about as long as those of its partner. Two
+curved surfaces touch in a narrow zone, which a surface with much longer edges does not resolve.
+A curved body held by contact alone stands on one vertex at first. As the slave it stands on a
+vertex of its own, which moves with it; as the master any small moment turns it to the next vertex.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.contact.geometry import Pairing, pair
-from solver.contact.normals import is_curved
+from solver.contact.geometry import Pairing, is_curved, pair
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.large import LargeDiscretisation
+from solver.fem.loads import Softening
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
-from solver.fem.softening import Softening
 from solver.fem.surface import Surface
-from solver.model.contact_pair import ContactPair
 from solver.model.model import Model
+from solver.model.pairs import ContactPair
+from solver.model.rigid import RigidBody
 from solver.typing import Array
 
 
@@ -228,3 +235,61 @@ def _hot(part: Part, surface: Surface) -> Softening | None:
         return None
     heat = Softening.of(part, part.X[:, surface.nodes])
     return heat if heat and heat.strength.fields.any() else None
+
+
+_RIGID = (0.4, 1.1)
+"""Edge length of a rigid slave over that of its partner: permitted range."""
+_COARSE = 2.0
+"""Edge length of a slave over that of its partner: with a larger ratio the partner becomes the
+slave if one of them is curved."""
+_STANDS = 0.75
+"""The same ratio if the partner is curved and contact alone holds it."""
+_AT_ONCE = 1_000_000
+"""Number of distances between vertices in memory at a time, about."""
+_NEAR = 0.01
+"""(Distance of a vertex - least distance) over the edge length: vertices up to this ratio are near
+contact."""
+
+
+def with_slaves(
+    model: Model, surfaces: Mapping[tuple[str, str], Surface], free: Collection[str]
+) -> Model:
+    """Return the model with slave and master exchanged in the pairs where this is better.
+
+    ``surfaces`` are those of all pairs, by body and boundary; ``free`` are the names of bodies held
+    by contact alone.
+    """
+    contacts = tuple(_ordered(model, contact, surfaces, free) for contact in model.contacts)
+    return replace(model, contacts=contacts)
+
+
+def _ordered(
+    model: Model,
+    contact: ContactPair,
+    surfaces: Mapping[tuple[str, str], Surface],
+    free: Collection[str],
+) -> ContactPair:
+    """Return the pair, its sides exchanged if this is better."""
+    slave, master = surfaces[contact.slave], surfaces[contact.master]
+    if isinstance(model.body(contact.master[0]), RigidBody):
+        return contact
+    ratio = _edges(slave, master)
+    if isinstance(model.body(contact.slave[0]), RigidBody):
+        suitable = _RIGID[0] <= ratio <= _RIGID[1]
+    else:
+        stands = is_curved(master) and contact.master[0] in free and contact.slave[0] not in free
+        most = _STANDS if stands else _COARSE
+        suitable = ratio <= most or not (is_curved(slave) or is_curved(master))
+    return contact if suitable else replace(contact, slave=contact.master, master=contact.slave)
+
+
+def _edges(slave: Surface, master: Surface) -> float:
+    """Return the median ratio of edge lengths, slave over master, at the vertices near contact."""
+    at, partner = slave.X[:, slave.vertices], master.X[:, master.vertices]
+    pieces = np.array_split(at, at.shape[1] * partner.shape[1] // _AT_ONCE + 1, axis=1)
+    each = (np.hypot(*(piece[:, :, None] - partner[:, None])) for piece in pieces)
+    nearest = np.concatenate([apart.argmin(axis=1) for apart in each])
+    distance = np.hypot(*(at - partner[:, nearest]))
+    own, its = slave.spacing, master.spacing
+    near = distance <= distance.min() + _NEAR * np.minimum(own, its[nearest])
+    return float(np.median(own[near] / its[nearest[near]]))

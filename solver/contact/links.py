@@ -20,14 +20,14 @@ from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactRows, ContactSolution, OnParts, joined
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
-from solver.fem.dofs import Dofs
 from solver.fem.loads import comparing
+from solver.fem.nodes import Dofs
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import Surface
 from solver.linear.solvers import Singular
-from solver.model.link import Link, Side
 from solver.model.model import Model
+from solver.model.pairs import Link, Side
 from solver.typing import Array, Bools, Ints
 
 _DEPENDENT = 1e-9

@@ -13,9 +13,8 @@ from scipy.linalg import null_space
 from scipy.sparse import csr_array
 
 from solver.contact.geometry import Pairing
-from solver.contact.interface import Interface, interface_of, surfaces_of
+from solver.contact.interface import Interface, interface_of, surfaces_of, with_slaves
 from solver.contact.links import Links, links_of, surfaces_of_links
-from solver.contact.slave import with_slaves
 from solver.contact.state import BodyState, ContactState, Converged, State
 from solver.errors import ModelError
 from solver.fem.deformation import PartResponse
@@ -31,8 +30,8 @@ from solver.fem.wheel import Wheel
 from solver.fem.window import Region, Windowed
 from solver.materials.law import Law
 from solver.model.friction import BoundLines, ContactPlaces, lines_of
-from solver.model.link import Side
 from solver.model.model import Model
+from solver.model.pairs import Side
 from solver.model.rigid import RigidBody
 from solver.typing import Array
 

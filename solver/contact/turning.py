@@ -15,12 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contact.geometry import Pairing
+from solver.contact.geometry import Pairing, end_normals, end_turns
 from solver.contact.interface import Interface
-from solver.contact.normals import end_normals, end_turns
 from solver.contact.problem import ContactRows
 from solver.contact.state import ContactState
-from solver.fem.dofs import Dofs
+from solver.fem.nodes import Dofs
 from solver.fem.part import Part
 from solver.fem.rigid import RigidPart
 from solver.fem.surface import Surface

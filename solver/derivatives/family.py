@@ -15,9 +15,9 @@ from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
 from solver.loading.program import Program
 from solver.results.acting import acting_on
+from solver.results.fields import Samples
 from solver.results.quantities import QUANTITIES
 from solver.results.run import FinishedRun, Output, Values
-from solver.results.samples import Samples
 
 _JUMP = 1e-3
 """Change of a number over the number, above which it jumps, as the place of a maximum that two

@@ -35,12 +35,11 @@ from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.operators import Operator
 from solver.fem.substructure import Substructure
-from solver.linear.solvers import Singular
-from solver.linear.threads import one_thread
-from solver.loading.control import Control
+from solver.linear.solvers import Singular, one_thread
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed
+from solver.loading.program import Control
 from solver.loading.stepper import Stepper, Way, placed
 from solver.typing import Array, Ints
 

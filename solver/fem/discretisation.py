@@ -7,11 +7,18 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, sparse
 
-from solver.fem import kinematics
 from solver.fem.assembly import Assembly, whole_matrix
-from solver.fem.deformation import Deformation, Kinematics, PartResponse, SmallStrain
-from solver.fem.dofs import Dofs
+from solver.fem.deformation import (
+    Deformation,
+    Kinematics,
+    PartResponse,
+    SmallStrain,
+    mean_dilatation,
+    rigid_motions,
+    strain_operator,
+)
 from solver.fem.loads import (
+    Softening,
     Superposed,
     check_removed,
     eigenstrains,
@@ -19,9 +26,8 @@ from solver.fem.loads import (
     nodal_forces,
     prescribed,
 )
-from solver.fem.nodes import Nodes
+from solver.fem.nodes import Dofs, Nodes
 from solver.fem.part import Part
-from solver.fem.softening import Softening
 from solver.fem.surface import Surface, extract, gathered
 from solver.linear import solvers as linear
 from solver.linear.solvers import LinearSolver
@@ -83,11 +89,11 @@ class Discretisation(Nodes, Part):
 
         Parameters
         ----------
-        values, gradients : as `kinematics.strain_operator` needs them
+        values, gradients : as `strain_operator` needs them
         mean : whether the volumetric strain is the mean over each element
         """
-        B = kinematics.strain_operator(values, gradients, self.points[0], self.body.kinematics)
-        return self._small_strain(kinematics.mean_dilatation(B, self.weights) if mean else B)
+        B = strain_operator(values, gradients, self.points[0], self.body.kinematics)
+        return self._small_strain(mean_dilatation(B, self.weights) if mean else B)
 
     def _small_strain(self, B: Array) -> SmallStrain:
         """Return small strain with the operator B of the elements."""
@@ -110,7 +116,7 @@ class Discretisation(Nodes, Part):
 
     def _motions(self, x: Array) -> Array:
         """Return the rigid motions (n, n_rigid) that supports leave free, with nodes at x."""
-        motions = kinematics.rigid_motions(x, self.body.kinematics)
+        motions = rigid_motions(x, self.body.kinematics)
         if self._held.any():
             motions = motions @ linalg.null_space(motions[self._held], rcond=1e-9)
         return motions

@@ -13,8 +13,8 @@ import numpy as np
 
 from solver.fem.deformation import Kinematics, PartResponse
 from solver.fem.discretisation import Discretisation
-from solver.fem.dofs import Dofs, vectors
 from solver.fem.log_strain import LogStrain, gradient_operator
+from solver.fem.nodes import Dofs, vectors
 from solver.fem.surface import edges_of
 from solver.materials import PlasticState, Response
 from solver.mesh.edges import shape_derivatives, shape_functions

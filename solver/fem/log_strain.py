@@ -28,8 +28,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.fem.deformation import Deformation, Some
-from solver.fem.kinematics import mean_dilatation
+from solver.fem.deformation import Deformation, Some, mean_dilatation
 from solver.tensors import SQRT2
 from solver.typing import Array, Ints
 

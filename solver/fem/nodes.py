@@ -1,8 +1,11 @@
-"""The nodes of a body and its quadrature."""
+"""The nodes of a body, the numbers of their unknowns, and its quadrature."""
 
 from __future__ import annotations
 
+from typing import NamedTuple, TypeVar
+
 import numpy as np
+from numpy.typing import NDArray
 from skfem import CellBasis
 
 from solver.mesh.elements import element_type
@@ -57,3 +60,28 @@ class Nodes:
     def boundary_nodes(self, boundary: str) -> Ints:
         """Return the nodes on a named boundary."""
         return np.unique(self.basis.get_dofs(self.body.facets(boundary)).flatten())
+
+
+Kind = TypeVar("Kind", bound=np.generic)
+
+
+class Dofs(NamedTuple):
+    """The unknowns of nodes (..., n) in a space of ``dim`` axes."""
+
+    nodes: Ints
+    dim: int
+
+    def along(self, axis: int) -> Ints:
+        """Return the unknown (..., n) of each node along an axis."""
+        return self.dim * self.nodes + axis
+
+    @property
+    def every(self) -> Ints:
+        """All unknowns (..., dim n), node by node."""
+        each = np.stack([self.along(axis) for axis in range(self.dim)], axis=-1)
+        return each.reshape(*self.nodes.shape[:-1], -1)
+
+
+def vectors(values: NDArray[Kind], dim: int) -> NDArray[Kind]:
+    """Return the vectors (dim, n) at nodes whose unknowns have values (dim n,)."""
+    return values.reshape(-1, dim).T

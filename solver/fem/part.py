@@ -11,8 +11,8 @@ import scipy  # loads scipy.spatial at its first use: few models need it
 from scipy import sparse
 
 from solver.fem.deformation import Deformation, PartResponse
-from solver.fem.dofs import Dofs, vectors
 from solver.fem.loads import Superposed
+from solver.fem.nodes import Dofs, vectors
 from solver.fem.surface import Surface
 from solver.materials.state import PlasticState
 from solver.model.body import Body

@@ -17,8 +17,8 @@ from scipy import sparse
 
 from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation, choose_pins
-from solver.fem.dofs import Dofs
 from solver.fem.loads import Superposed
+from solver.fem.nodes import Dofs
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement

@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from solver.errors import ModelError
-from solver.fem.dofs import Dofs
-from solver.fem.nodes import Nodes
+from solver.fem.nodes import Dofs, Nodes
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.typing import Array, Ints
 

@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from solver.fem.discretisation import Discretisation
-from solver.fem.dofs import vectors
-from solver.fem.frame import MovingFrame, RigidMotion, turning
 from solver.fem.loads import Superposed
+from solver.fem.nodes import vectors
 from solver.fem.part import same_unknowns
+from solver.fem.rigid import MovingFrame, RigidMotion, turning
 from solver.fem.substructure import Substructure
 from solver.fem.surface import Surface
 from solver.typing import Array, Ints

@@ -21,10 +21,9 @@ import numpy as np
 from solver.fem.assembly import Assembly
 from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation, choose_pins
-from solver.fem.dofs import Dofs, vectors
-from solver.fem.loads import Superposed
+from solver.fem.loads import Softening, Superposed
+from solver.fem.nodes import Dofs, vectors
 from solver.fem.operators import Assembled, Operator, Restricted
-from solver.fem.softening import Softening
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
 from solver.linear.solvers import Begun, Singular

@@ -3,6 +3,9 @@
 A matrix is given by its upper triangle in CSR form. `LinearSolver.compliance` is available on the
 ``kept`` unknowns. `analyse` chooses MKL PARDISO if it is installed, else SuperLU; the environment
 variable ``RESIDUA_LINEAR_SOLVER`` (``pardiso`` or ``superlu``) overrides this choice.
+
+BLAS uses one thread (`one_thread`): the dense blocks are small, and runs are parallel. Several
+threads spend their time on synchronisation: on two busy cores a run took seven times as long.
 """
 
 from __future__ import annotations
@@ -10,13 +13,16 @@ from __future__ import annotations
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
+from threadpoolctl import ThreadpoolController
 
 from solver.errors import ModelError
 from solver.linear import pardiso
@@ -273,3 +279,13 @@ def analyse_several(upper: sparse.csr_array, count: int, name: str = "auto") -> 
     if chosen(name) == "pardiso":
         return _PardisoFactors(upper, count)
     return _SuperLUFactors(upper, count)
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Return a context in which BLAS uses one thread."""
+    return _controller().limit(limits=1, user_api="blas")

@@ -27,22 +27,21 @@ from itertools import pairwise
 import numpy as np
 
 from solver.contact.candidates import Candidates, find_candidates, no_candidates
-from solver.contact.ends import beyond_end
+from solver.contact.drift import beyond_end
 from solver.contact.state import ContactState, Converged, State, Timing
 from solver.contact.system import System
 from solver.fem.deformation import PartResponse
 from solver.fem.operators import Operator
 from solver.fem.window import Windowed
-from solver.linear.solvers import Singular
-from solver.linear.threads import one_thread
-from solver.loading.acceleration import Series
-from solver.loading.control import Tolerances
+from solver.linear.solvers import Singular, one_thread
 from solver.loading.energy import plastic_work
 from solver.loading.flow import is_singular, mechanism
 from solver.loading.outcome import IncrementFailed, Mechanism, Yielded
+from solver.loading.program import Tolerances
 from solver.loading.slide import Slide, slide
 from solver.loading.step import (
     NewtonStep,
+    Series,
     newton_step,
     norm,
     on_parts,

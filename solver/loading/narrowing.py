@@ -20,9 +20,9 @@ from solver.fem.discretisation import Discretisation
 from solver.fem.part import Part
 from solver.fem.window import Region, Windowed
 from solver.linear.solvers import Singular
-from solver.loading.control import Tolerances
 from solver.loading.increment import Balanced, Increment
 from solver.loading.outcome import IncrementFailed
+from solver.loading.program import Tolerances
 from solver.materials import Response
 from solver.typing import Array, Bools
 

@@ -1,18 +1,18 @@
-"""The failure of an increment, and the result of a program."""
+"""The failure of an increment, the result of a program and of its cycles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from solver.contact.state import Converged, State
 from solver.errors import NotConverged, SolverError
-from solver.loading.cycle import Cycle
 from solver.loading.slide import Slide
 from solver.tensors import AXES
+from solver.typing import Array, Ints
 
 _CLOSE = 1e-3
 """Relative distance between a load and the excluded load above it: a closer load is at the
@@ -191,3 +191,46 @@ class Outcome:
     def _points_beside(self) -> list[dict[str, Any]]:
         each = zip(*(found.beside for found in self.points.values()), strict=False)
         return [dict(zip(self.points, found, strict=True)) for found in each]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cycle:
+    """A cycle of repeated stages.
+
+    Attributes
+    ----------
+    points : (n,) numbers of the points that flow in the cycle, counted over all parts
+    accumulated : (n,) equivalent plastic strain accumulated in the cycle
+    net : (n,) equivalent of the change of the signed plastic strain
+    dissipated : plastic work and work of friction [N mm]; for a closed cycle the area of all loops
+        of force over displacement
+    before : largest plastic strain accumulated before the cycle
+    beside : the same cycle of the neighbouring runs, if there are any
+    """
+
+    points: Ints
+    accumulated: Array
+    net: Array
+    dissipated: float
+    before: float
+    beside: tuple[Cycle, ...] = ()
+
+    @classmethod
+    def between(cls, start: Converged, end: Converged) -> Self:
+        """Return the cycle between two converged states."""
+        both = list(zip(start.state.plastic, end.state.plastic, strict=True))
+        more = np.concatenate([new.accumulated - old.accumulated for old, new in both])
+        flow = np.hstack([new.plastic_strain - old.plastic_strain for old, new in both])
+        points = np.flatnonzero(more)
+        terms = (
+            getattr(at.energy, name) for at in (start, end) for name in ("plastic", "friction")
+        )
+        plastic, friction, plastic_after, friction_after = terms
+        return cls(
+            points=points,
+            accumulated=more[points],
+            net=np.sqrt(2 / 3 * (flow[:, points] ** 2).sum(axis=0)),
+            dissipated=plastic_after + friction_after - plastic - friction,
+            before=max(float(old.accumulated.max(initial=0.0)) for old, _ in both),
+            beside=tuple(map(cls.between, start.beside, end.beside)),
+        )

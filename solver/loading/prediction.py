@@ -18,7 +18,7 @@ from solver.contact.interface import Interface
 from solver.contact.problem import OPEN
 from solver.contact.state import ContactState, State
 from solver.contact.system import System
-from solver.fem.dofs import Dofs
+from solver.fem.nodes import Dofs
 from solver.fem.part import Part, same_unknowns
 from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel

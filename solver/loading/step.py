@@ -1,20 +1,41 @@
-"""One Newton step of all parts, condensed to the contact points and solved there."""
+"""One Newton step of all parts, condensed to the contact points and solved there; its acceleration.
+
+Where contact forces turn with surfaces and bodies (`turned_problem`), a step has, with the
+stiffness K of the parts, their rigid motions R, and the unknowns of contact c,
+
+    u = K^-1 (r + H' F - T u_c) + (R - Z) q,   Z = K^-1 (K R),   u_c = M (a + C H' F + (R - Z) q)
+
+where T is the stiffness of the turning forces (`solver.contact.turning`), C the compliance of the
+unknowns c, ``M = (1 + C T)^-1``, and a the displacements by r alone. K R is not zero under load:
+the forces within a body turn with it. The resultants of all forces on the rigid motions must
+vanish.
+
+The tangent lacks derivatives of the friction bound along a surface, with small strain also those
+of contact normals, and may be blended with the elastic stiffness. Newton's method then converges
+like a geometric series, sometimes with a ratio of 0.9. Anderson's mixing combines the last iterates
+so that the remaining step is smallest. If the missing part of the tangent is constant, this
+restores Newton's method.
+
+D.G. Anderson, J. ACM 12 (1965) 547-560; H.F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011)
+1715-1735, algorithm 2.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from solver.contact.candidates import Candidates
 from solver.contact.links import solve_linked
 from solver.contact.problem import ContactProblem, ContactSolution
 from solver.contact.system import System
+from solver.contact.turning import Turning
 from solver.fem.operators import Operator
 from solver.fem.part import Part
-from solver.linear.solvers import Begun
-from solver.loading.turned import turned_problem
+from solver.linear.solvers import Begun, Singular
 from solver.typing import Array, Ints
 
 Vectors = tuple[Array, ...]
@@ -213,3 +234,126 @@ def search(slope: Callable[[float], float], start: float, end: float) -> float:
         else:
             high, at_low, at_high = share, 0.5 * at_low, now
     return share
+
+
+def turned_problem(
+    candidates: Candidates,
+    turning: Turning,
+    operators: Sequence[Operator],
+    begun: Sequence[Begun],
+    rigid: Sequence[tuple[Array, Array | None]],
+    residuals: Sequence[Array],
+) -> tuple[ContactProblem, Callable[[Array, Array], Vectors]]:
+    """Return the problem, and a function of its forces and rigid motions to displacements.
+
+    Parameters
+    ----------
+    begun : displacements of each part by its out-of-balance forces
+    rigid : for each part, R and K R, None where that is zero
+    residuals : external minus internal forces of each part, without contact forces [N]
+    """
+    H, T, forces = turning.rows, turning.stiffness, candidates.forces
+    free, own, resultants = [], [], []
+    for (R, KR), operator, r in zip(rigid, operators, residuals, strict=True):
+        motion, D = R, np.zeros((R.shape[1],) * 2)
+        if KR is not None:
+            still = np.zeros(len(R))
+            Z = np.stack([operator.begin(each).finish(still) for each in KR.T], axis=1)
+            motion, D = R - Z, KR.T @ Z - R.T @ KR
+        free.append(motion)
+        own.append(D)
+        resultants.append(motion.T @ r)
+    each = zip(operators, turning.dofs, strict=True)
+    C = block_diag(*(operator.compliance(at, np.eye(len(at))) for operator, at in each))
+    a = np.concatenate([part.kept[at] for part, at in zip(begun, turning.dofs, strict=True)])
+    R = block_diag(*(of[at] for of, at in zip(free, turning.dofs, strict=True)))
+    try:
+        M = np.linalg.inv(np.eye(len(T)) + C @ T)
+    except np.linalg.LinAlgError as error:
+        raise Singular("contact forces turn surfaces that do not resist") from error
+    by_motion, TM = turning.motions @ M, T @ M
+    W = by_motion @ C @ H.T
+    kept = H - H @ (TM @ C).T
+    problem = ContactProblem(
+        W=W,
+        offset=candidates.motion + by_motion @ a - W @ forces,
+        lines=candidates.lines,
+        A=kept @ R,
+        G=by_motion @ R,
+        balance=np.concatenate(resultants) - R.T @ (TM @ (a - C @ (H.T @ forces))),
+        D=block_diag(*own) - R.T @ TM @ R,
+    )
+
+    def moved(forces: Array, q: Array) -> Vectors:
+        more = H.T @ (forces - candidates.forces)
+        change = turning.split(more - TM @ (a + C @ more + R @ q))
+        motions = np.split(q, np.cumsum([of.shape[1] for of in free])[:-1])
+        out = []
+        for part, of, at, pushed, motion in zip(
+            begun, free, turning.dofs, change, motions, strict=True
+        ):
+            nodal = np.zeros(len(of))
+            nodal[at] = pushed
+            out.append(part.finish(nodal) + of @ motion)
+        return tuple(out)
+
+    return problem, moved
+
+
+_SLOW = 0.6
+"""|step_k| / |step_k-1|: convergence is slow above this ratio."""
+_PATIENCE = 5
+"""Number of slow steps in a row before acceleration; a change of contact status causes a few."""
+_WINDING = 3.0
+"""|step_k| / |step_k-1|: a step above this ratio begins a new series."""
+_ALONG = 0.7
+"""Cosine of the angle between two steps: above it they have the same direction."""
+_DEPTH = 5
+
+
+@dataclass(slots=True)
+class Series:
+    """Successive whole steps that hardly decrease, with the same contact status.
+
+    They may alternate or circle about the solution. Steps that grow in one direction may be plastic
+    flow of a body and are not accelerated. A partial step ends the series: points have changed
+    between elastic and plastic, so the missing part of the tangent has changed too.
+    """
+
+    _key: bytes = b""
+    _slow: int = 0
+    _places: list[Array] = field(default_factory=list)
+    _steps: list[Array] = field(default_factory=list)
+
+    def sum(
+        self, u: Vectors, candidates: Candidates, step: NewtonStep, share: float
+    ) -> tuple[Vectors, Array] | None:
+        """Return accelerated displacements and contact forces after a step.
+
+        None if convergence is fast, as nearly always: the step itself is then used.
+        """
+        if share < 1:
+            self._slow, self._places, self._steps = 0, [], []
+            return None
+        place = np.concatenate([*u, candidates.forces])
+        now = np.concatenate([*step.u, step.forces - candidates.forces])
+        cut = np.cumsum([len(ui) for ui in u])
+        n = int(cut[-1])
+        key = b"".join(v.tobytes() for v in (*candidates.vertices, step.status))
+        size = np.linalg.norm(now[:n])
+        last = np.linalg.norm(self._steps[-1][:n]) if self._steps else 0.0
+        along = now[:n] @ self._steps[-1][:n] if self._steps else 0.0
+        flows = size > last and along > _ALONG * size * last
+        if key != self._key or size > _WINDING * last or flows:
+            self._key, self._slow, self._places, self._steps = key, 0, [], []
+        elif self._slow < _PATIENCE:
+            self._slow = self._slow + 1 if size > _SLOW * last else 0
+        self._places = [*self._places[-_DEPTH:], place]
+        self._steps = [*self._steps[-_DEPTH:], now]
+        if self._slow < _PATIENCE:
+            return None
+        moved = np.diff(self._places, axis=0)
+        changed = np.diff(self._steps, axis=0)
+        weight = np.linalg.lstsq(changed[:, :n].T, now[:n])[0]
+        *ahead, forces = np.split(place + now - weight @ (moved + changed), cut)
+        return tuple(ahead), forces

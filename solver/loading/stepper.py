@@ -17,15 +17,14 @@ from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged
 from solver.fem.fields import elastic_energy
 from solver.fem.rigid import RigidPart
-from solver.linear.threads import one_thread
-from solver.loading.control import INCREMENT_ERROR, Control
+from solver.linear.solvers import one_thread
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.integration import doubtful, integrated, lost
 from solver.loading.narrowing import FailedInWindows, narrowed
 from solver.loading.outcome import IncrementFailed, Mechanism, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
-from solver.loading.program import ROUNDING
+from solver.loading.program import INCREMENT_ERROR, ROUNDING, Control
 from solver.loading.slide import Slide, spent
 
 Attempt = tuple[float, Mechanism | Slide | None]

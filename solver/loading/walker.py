@@ -17,12 +17,9 @@ import numpy as np
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.errors import LimitLoad, ModelError, NotConverged
-from solver.loading.bearing import excess_shear
-from solver.loading.control import Control
-from solver.loading.cycle import Cycle
-from solver.loading.freed import check_freed
-from solver.loading.outcome import Outcome, PathEnded, Point, Settled, Tally
-from solver.loading.program import HALVINGS, Program, StepRefinement, Target, shared
+from solver.loading.checks import check_freed, excess_shear
+from solver.loading.outcome import Cycle, Outcome, PathEnded, Point, Settled, Tally
+from solver.loading.program import HALVINGS, Control, Program, StepRefinement, Target, shared
 from solver.loading.stepper import Followers, Report, Stepper, Watch, turned
 
 Points = Mapping[str, Converged]

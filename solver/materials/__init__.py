@@ -14,6 +14,8 @@ from solver.materials.curves import Curve, Power, Table, Voce
 from solver.materials.elastic_plastic import (
     Chaboche,
     ElasticPlastic,
+    Hardening,
+    Material,
     SmoothMaterial,
     TrescaMaterial,
 )
@@ -21,7 +23,6 @@ from solver.materials.elasticity import Elasticity
 from solver.materials.heated import Heated
 from solver.materials.law import Law
 from solver.materials.layered import Layered
-from solver.materials.material import Hardening, Material
 from solver.materials.plane_stress import PlaneStress
 from solver.materials.radial_return import LinearHardening
 from solver.materials.smooth_surface import Profile, SmoothSurface

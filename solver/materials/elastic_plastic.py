@@ -1,4 +1,4 @@
-"""The law of parts: elasticity, yield surface, hardening curve and back stresses.
+"""The law of parts: elasticity, yield surface, hardening curve and back stresses; or by numbers.
 
 `ElasticPlastic` is the law; its subclasses only declare its parts. The parts decide how it
 responds: in closed form if hardening is linear on a von Mises surface, by one scalar equation or
@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from solver.materials.radial_return import LinearHardening, radial_return
 from solver.materials.smooth_surface import SmoothSurface
 from solver.materials.state import PlasticState, Response
 from solver.materials.yield_surface import Tresca, VonMises
+from solver.parameters import Checked, Fraction, HardeningRatio, Infinite, Modulus, Poisson
 from solver.typing import Array
 
 
@@ -233,3 +235,71 @@ class SmoothMaterial(ElasticPlastic):
     def __post_init__(self) -> None:
         ElasticPlastic.__post_init__(self)
         self.surface.check()
+
+
+Hardening = Literal["none", "isotropic", "kinematic", "mixed"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material(Checked, ElasticPlastic):
+    """An isotropic elastic, linearly hardening von Mises material.
+
+    Attributes
+    ----------
+    youngs_modulus : E [MPa]
+    poisson_ratio : nu
+    yield_stress : uniaxial yield stress [MPa]; ``inf`` (default) means elastic
+    hardening : ``none``, ``isotropic``, ``kinematic`` (Prager) or ``mixed``
+    hardening_ratio : Eu / E, ratio of the slope of the uniaxial curve beyond yield to Young's
+        modulus
+    isotropic_fraction : part of the plastic modulus that expands the yield surface when
+        ``hardening`` is ``mixed``; the rest moves it
+
+    Raises
+    ------
+    ModelError
+        if a number is out of its range, or the word unknown
+    """
+
+    youngs_modulus: Modulus
+    poisson_ratio: Poisson
+    yield_stress: Modulus | Infinite = math.inf
+    hardening: Hardening = "none"
+    hardening_ratio: HardeningRatio = 0.0
+    isotropic_fraction: Fraction = 0.5
+
+    # -- parts ---------------------------------------------------------------------------------
+
+    @cached_property
+    def elasticity(self) -> Elasticity:
+        """Hooke's law."""
+        return Elasticity(youngs_modulus=self.youngs_modulus, poisson_ratio=self.poisson_ratio)
+
+    @property
+    def curve(self) -> Voce:
+        """Linear growth of the yield surface."""
+        return Voce(yield_stress=self.yield_stress, modulus=self.isotropic_modulus)
+
+    @property
+    def back_stresses(self) -> tuple[ArmstrongFrederick, ...]:
+        """Prager's back stress, if the yield surface moves."""
+        modulus = self.kinematic_modulus
+        return (ArmstrongFrederick(modulus),) if modulus else ()
+
+    @property
+    def plastic_modulus(self) -> float:
+        """H = E Eu / (E - Eu): slope of stress over plastic strain in tension [MPa]."""
+        if self.hardening == "none":
+            return 0.0
+        return self.youngs_modulus * self.hardening_ratio / (1 - self.hardening_ratio)
+
+    @property
+    def isotropic_modulus(self) -> float:
+        """Part of the plastic modulus that expands the yield surface [MPa]."""
+        share = {"isotropic": 1.0, "mixed": self.isotropic_fraction}.get(self.hardening, 0.0)
+        return share * self.plastic_modulus
+
+    @property
+    def kinematic_modulus(self) -> float:
+        """Part of the plastic modulus that moves the yield surface [MPa]."""
+        return self.plastic_modulus - self.isotropic_modulus

@@ -18,7 +18,6 @@ from solver.mesh.opening import faces_of
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Centrifugal, Displacement, Kinematics, Load, Pressure
-from solver.model.motion import Axle
 from solver.parameters import Thickness, check
 from solver.tensors import AXES
 
@@ -221,3 +220,27 @@ class Body:
             )
             raise ModelError(field, boundary, allowed)
         return facets
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axle:
+    """Makes an elastic body a wheel that rotates about ``centre``.
+
+    Attributes
+    ----------
+    centre : (x, y) of the hub in the mesh [mm]
+    radius : radius of the rim [mm]
+    force : vertical force on the axle, positive downwards [N]
+    moment : moment on the axle, positive counter-clockwise [N mm]
+    position : displacement of the axle along x from its place in the mesh [mm]
+    rotation : prescribed rotation of the hub, instead of the moment [rad]
+    turned : rotation at the start, so that the fine part of the rim reaches the track [rad]
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    force: Amplitude
+    moment: Amplitude
+    position: Amplitude
+    rotation: Amplitude | None = None
+    turned: float = 0.0

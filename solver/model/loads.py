@@ -382,7 +382,7 @@ class Removal(Load):
     """The removal of the elements of a region of the body, for example by machining.
 
     The load factor is the removed share of their stiffness, and of their forces on other elements.
-    At 1 a negligible stiffness remains (`solver.fem.softening`). The amplitude is required and must
+    At 1 a negligible stiffness remains (`solver.fem.loads`). The amplitude is required and must
     not decrease.
 
     Attributes

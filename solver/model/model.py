@@ -10,8 +10,7 @@ from solver.errors import ModelError
 from solver.materials.doubts import doubts
 from solver.mesh.elements import element_type
 from solver.model.body import Body
-from solver.model.contact_pair import ContactPair
-from solver.model.link import Link
+from solver.model.pairs import ContactPair, Link
 from solver.model.rigid import Moved, Pushed, RigidBody
 from solver.model.singular import SingularPoint
 from solver.parameters import check

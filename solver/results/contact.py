@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from solver.results.contact_result import ContactResult
+from solver.results.acting import ContactResult
 from solver.results.outputs import output
 from solver.results.places import FRACTION
 from solver.results.quantities import declare, placed

@@ -12,9 +12,15 @@ from annotated_types import Interval
 
 from solver.contact.state import BodyState
 from solver.fem.surface import edges_of
-from solver.fracture.intensity import AtPoints, by_displacements, by_integral, tensor
-from solver.fracture.near_tip import PlaneElasticity
-from solver.fracture.tip import Tip, tips_of
+from solver.fracture.intensity import (
+    AtPoints,
+    PlaneElasticity,
+    Tip,
+    by_displacements,
+    by_integral,
+    tensor,
+    tips_of,
+)
 from solver.mesh.edges import shape_functions
 from solver.parameters import Checked, described
 from solver.results.outputs import output

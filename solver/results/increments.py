@@ -11,9 +11,8 @@ import numpy as np
 
 from solver.contact.state import Converged
 from solver.contact.system import System
-from solver.fem.dofs import vectors
-from solver.fem.frame import RigidMotion
-from solver.fem.rigid import RigidPart
+from solver.fem.nodes import vectors
+from solver.fem.rigid import RigidMotion, RigidPart
 from solver.fem.wheel import Wheel
 from solver.results.contact import CONTACT
 from solver.results.quantities import Quantity, declare

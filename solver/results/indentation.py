@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.fem.dofs import Dofs, vectors
+from solver.fem.nodes import Dofs, vectors
 from solver.mesh.rounding import ROUNDED
 from solver.parameters import Checked, Length, described
-from solver.results.contact_result import contact_patches
+from solver.results.acting import contact_patches
 from solver.results.fields import Bodies, Solved
 from solver.results.increments import curve
 from solver.results.outputs import output

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from solver.results.acting import contact_result
 from solver.results.contact import contacts
-from solver.results.contact_result import contact_result
 from solver.results.increments import over_increments
 from solver.results.places import along_lines, at_points
 from solver.results.requested import RequestedNumber

@@ -39,8 +39,8 @@ _OUTPUTS: dict[str, NamedOutput] = {}
 MODULES = tuple(
     f"solver.results.{module}"
     for module in (
-        "contact", "corner", "cracks", "extremes", "fatigue", "figures", "increments",
-        "indentation", "maps", "places", "wear",
+        "contact", "cracks", "extremes", "fatigue", "increments", "indentation", "maps", "places",
+        "singularity", "wear",
     )
 )  # fmt: skip
 """Modules that define outputs of scene files, or quantities of these."""

@@ -11,14 +11,13 @@ import numpy as np
 from solver.errors import ModelError
 from solver.mesh.rounding import in_box
 from solver.parameters import Coordinate
+from solver.results.acting import ContactResult
 from solver.results.body_fields import BODY_FIELDS, BodyField
-from solver.results.contact_result import ContactResult
 from solver.results.fields import Solved, SystemFields
-from solver.results.invariants import component, known_components
 from solver.results.quantities import Quantity
 from solver.results.run import Values
 from solver.results.view import Places
-from solver.tensors import AXES
+from solver.tensors import AXES, component, known_components
 from solver.typing import Array
 
 Span = tuple[Coordinate, Coordinate]

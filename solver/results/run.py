@@ -10,10 +10,9 @@ from solver.audit.report import Audit
 from solver.loading.outcome import Outcome
 from solver.model.singular import SingularPoint
 from solver.results.acting import Acting
-from solver.results.fields import Bodies, Solved
+from solver.results.fields import Bodies, Samples, Solved
 from solver.results.mesh_fields import MeshFields
 from solver.results.quantities import Quantity
-from solver.results.samples import Samples
 from solver.results.view import View
 from solver.typing import Array
 

@@ -17,13 +17,11 @@ from solver.audit.report import Audit, audit
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.errors import ModelError
-from solver.fem.dofs import vectors
-from solver.fem.frame import RigidMotion
+from solver.fem.nodes import vectors
+from solver.fem.rigid import RigidMotion
 from solver.late import Late
-from solver.loading.control import Control, PathControl
-from solver.loading.cycle import Cycle
-from solver.loading.outcome import Tally
-from solver.loading.program import ROUNDING, Lap, Program, Stage
+from solver.loading.outcome import Cycle, Tally
+from solver.loading.program import ROUNDING, Control, Lap, PathControl, Program, Stage
 from solver.loading.stepper import Stepper
 from solver.loading.walker import Walker
 from solver.model.body import Body
@@ -31,15 +29,13 @@ from solver.model.model import Model
 from solver.model.rigid import RigidBody
 from solver.parameters import Positive, require
 from solver.results import saved
+from solver.results.acting import ContactResult, contact_result
 from solver.results.body_fields import BodyValues
-from solver.results.contact_result import ContactResult, contact_result
 from solver.results.cracks import StressIntensity, stress_intensities
-from solver.results.cycles import decided, shakedown_of
-from solver.results.export import write_vtu
 from solver.results.fields import SystemFields
 from solver.results.increments import Observed, observe
-from solver.results.mesh_fields import MeshFields
-from solver.results.shakedown import Shakedown
+from solver.results.mesh_fields import MeshFields, write_vtu
+from solver.results.shakedown import Shakedown, decided, shakedown_of
 from solver.results.view import Places
 from solver.tensors import to_tensor
 from solver.typing import Array
@@ -198,8 +194,8 @@ class Solution:
     def to_vtu(self, folder: str | Path) -> Path:
         """Write fields at the nodes as one .vtu per stage into a folder, for ParaView.
 
-        Returns the path of the .pvd file that lists them. `solver.results.export.to_meshio` has the
-        names of the fields.
+        Returns the path of the .pvd file that lists them. See
+        `solver.results.mesh_fields.to_meshio` for the names of the fields.
         """
         return write_vtu(self.mesh_fields(), Path(folder))
 

@@ -23,12 +23,11 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from solver.errors import LimitLoad, NotConverged, Runaway, TooLong, WindowTooSmall
-from solver.linear.krylov import gmres
+from solver.linear.iterative import gmres
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
-from solver.rolling.body import FlowPast, PassedBody, S
 from solver.rolling.flow import PARTS
-from solver.rolling.load import AppliedLoad, PassingLoad
+from solver.rolling.load import AppliedLoad, FlowPast, PassedBody, PassingLoad, S
 from solver.typing import Array
 
 TOLERANCE = 1e-4

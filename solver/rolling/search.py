@@ -20,10 +20,9 @@ from typing import Any
 import numpy as np
 
 from solver.errors import LimitLoad, NoContact, NotConverged, Spins, TooLong, WindowTooSmall
+from solver.materials.elastic_plastic import Material
 from solver.materials.law import Law
-from solver.materials.material import Material
-from solver.rolling.body import PassedBody, S
-from solver.rolling.load import PassingLoad, RollingLoad, spinning
+from solver.rolling.load import PassedBody, PassingLoad, RollingLoad, S, spinning
 from solver.rolling.passing import TOLERANCE, Pass, SolveBudget, passing
 from solver.typing import Array
 

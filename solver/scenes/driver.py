@@ -14,17 +14,16 @@ from solver.audit.report import Audit, audit
 from solver.contact.system import System
 from solver.errors import LimitLoad
 from solver.late import Late
-from solver.loading.control import Control
 from solver.loading.outcome import Outcome
-from solver.loading.program import Program, walked
+from solver.loading.program import Control, Program, walked
 from solver.loading.walker import Walker
 from solver.results.acting import acting_on
-from solver.results.cycles import decided
-from solver.results.outlines import outlines
+from solver.results.fields import Samples
+from solver.results.maps import outlines
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
 from solver.results.run import FinishedRun, Output, Values
-from solver.results.samples import Samples
+from solver.results.shakedown import decided
 from solver.results.singularity import singular_points
 from solver.scenes.scene import Monitor, Scene
 

@@ -155,11 +155,10 @@ PUNCH = Scene(
     outputs=(
         *late("results.maps", "maps", "profiles", "surfaces"),
         *late("results.contact", "contact"),
-        *late("results.figures", "extremes"),
-        *late("results.extremes", "residual_extremes"),
+        *late("results.extremes", "extremes", "residual_extremes"),
         *late("scenes.punch_setup", "figures"),
     ),
-    costs=late("results.figures", "cost"),
+    costs=late("results.extremes", "cost"),
     increment_error=0.04,  # the error of the mesh is larger
     effort=_effort,
     advice={

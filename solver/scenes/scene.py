@@ -10,8 +10,7 @@ from typing import Any, NoReturn
 from solver.derivatives.asked import Derivatives
 from solver.errors import NotConverged, TooLong
 from solver.late import late
-from solver.loading.control import INCREMENT_ERROR
-from solver.loading.program import Program, StepRefinement
+from solver.loading.program import INCREMENT_ERROR, Program, StepRefinement
 from solver.results.quantities import QUANTITIES, Quantity
 from solver.results.record import Record, Status
 from solver.results.view import View

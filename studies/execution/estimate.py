@@ -26,7 +26,7 @@ from studies.definition.study import Study
 from studies.definition.vocabulary import FIELDS, OK, SOLVED
 from studies.errors import StudyError
 from studies.execution.bundles import most_together, setup_of
-from studies.execution.limits import LOADED
+from studies.execution.executor import LOADED
 from studies.numbers import size_text, time_text
 from studies.storage.store import Store
 

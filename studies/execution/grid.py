@@ -19,12 +19,12 @@ from studies.execution.executor import (
     Event,
     Finished,
     Function,
+    Limits,
     Message,
     StopCheck,
     Waiting,
 )  # fmt: skip
-from studies.execution.limits import Limits
-from studies.execution.proof import Unfit
+from studies.execution.task import Unfit
 from studies.execution.watch import Ticket, Watch
 from studies.execution.workers import connect
 

@@ -26,13 +26,11 @@ from studies.execution.access import Access
 from studies.execution.asking import Asking
 from studies.execution.bundles import Bundle, bundles
 from studies.execution.estimate import memory_needed
-from studies.execution.executor import Event, Executor, Finished, Here, Message, Waiting
+from studies.execution.executor import Event, Executor, Finished, Here, Limits, Message, Waiting
 from studies.execution.forks import SHARED
-from studies.execution.limits import Limits
-from studies.execution.proof import Proof, proof_of
 from studies.execution.result import answered, result
 from studies.execution.script import check_script
-from studies.execution.task import PathTask, walk
+from studies.execution.task import PathTask, Proof, proof_of, walk
 from studies.storage.store import Store
 
 own_workers = Late("studies.execution.workers:own_workers")

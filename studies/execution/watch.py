@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from studies.errors import GridLost
-from studies.execution.executor import Waiting
-from studies.execution.limits import Limits
+from studies.execution.executor import Limits, Waiting
 
 _QUIET = 10.0
 """Seconds without a worker that accepts tasks until this is reported."""

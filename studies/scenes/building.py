@@ -19,11 +19,10 @@ from solver.mesh.grids import marked, within, without
 from solver.mesh.opening import opened
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
-from solver.model.contact_pair import ContactPair
 from solver.model.friction import FRICTION, FrictionLaw
-from solver.model.link import Link
 from solver.model.loads import LOADS, Load
 from solver.model.model import Model
+from solver.model.pairs import ContactPair, Link
 from solver.model.rigid import RigidBody
 from solver.model.tabulated import Tabulated
 from solver.scenes.material_parameters import MaterialParameters
@@ -239,7 +238,7 @@ class Builder:
         return self.attempt(where, lambda: load_of(table, courses, files))
 
     def _contact(self, k: int, table: tables.ContactTable) -> ContactPair | None:
-        from solver.model.contact_pair import ContactPair
+        from solver.model.pairs import ContactPair
 
         slave, master = (tuple(side.split(".")) for side in (table.slave, table.master))
         for side, (body, boundary) in (("slave", slave), ("master", master)):
@@ -264,7 +263,7 @@ class Builder:
         )
 
     def _link(self, k: int, table: tables.LinkTable) -> Link | None:
-        from solver.model.link import Link
+        from solver.model.pairs import Link
 
         sides = [(body, boundary) for body, _, boundary in (s.partition(".") for s in table.sides)]
         for name, (body, boundary) in zip(("slave", "master"), sides, strict=False):

@@ -16,10 +16,9 @@ from solver.parts import Declared
 from studies.errors import SceneError, StudyError
 from studies.materials import parameters_in, read_material
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
-from studies.scenes.mending import Where, mended
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.quantities import in_own_units, wrong_units
-from studies.scenes.refusals import dotted, mistakes_of
+from studies.scenes.refusals import Where, dotted, mended, mistakes_of
 from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import ACCURACY, NAMED, OPEN, ParameterTable, SceneFile
 from studies.toml import read_given, toml_of

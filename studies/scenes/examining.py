@@ -18,8 +18,7 @@ from studies.scenes.checking import (
 )
 from studies.scenes.description import Description
 from studies.scenes.effort import too_long
-from studies.scenes.mending import Where
-from studies.scenes.refusals import dotted
+from studies.scenes.refusals import Where, dotted
 from studies.scenes.results import places_of, view_of
 from studies.scenes.shipped import is_built_in
 
@@ -84,8 +83,8 @@ def _without_stand_ins(
 def _build(builder: Builder, scene: tables.SceneFile) -> None:
     """Build model, system and samples; the builder collects the mistakes."""
     from solver.contact.system import System
-    from solver.loading.freed import check_freed
-    from solver.results.samples import Samples
+    from solver.loading.checks import check_freed
+    from solver.results.fields import Samples
 
     model = builder.model()
     if model is not None:

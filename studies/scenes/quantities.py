@@ -13,8 +13,7 @@ from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin
 
 from solver.parameters import is_number
 from studies.errors import StudyError
-from studies.scenes.mending import Where
-from studies.scenes.refusals import dotted
+from studies.scenes.refusals import Where, dotted
 from studies.scenes.table import SceneTable, unit_in
 from studies.scenes.tables import SceneFile
 from studies.units import COHERENT, UnitError, converted, is_quantity, number_in, words_of

@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, StringConstraints, create_model
 
 from solver.errors import ModelError
-from solver.loading.control import INCREMENT_ERROR
+from solver.loading.program import INCREMENT_ERROR
 from solver.mesh.lines import closer
 from solver.model.amplitude import Amplitude as OverTime
-from solver.model.link import Components, Springs
 from solver.model.loads import LOADS, Load
+from solver.model.pairs import Components, Springs
 from solver.parameters import Accuracy, Coordinate, Length, Needs, Other, Stress
 from solver.parts import Declared, declared
 from solver.results.outputs import outputs

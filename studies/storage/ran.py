@@ -99,7 +99,7 @@ def _machine() -> str:
     """
     from threadpoolctl import threadpool_info  # not needed by those who read files
 
-    from solver.linear.threads import one_thread
+    from solver.linear.solvers import one_thread
 
     with one_thread():  # as in the increments of a run
         loaded = threadpool_info()

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from solver.materials.doubts import doubts
 from solver.scenes import Scene
-from studies.definition.parameters import Parameter, parameters_of, read_values
+from studies.definition.parameters import Parameter, build, parameters_of, read_values
 from studies.definition.study import Study
 from studies.scenes.registry import beside, scene_named, summaries
 from studies.toml import read_toml
@@ -62,3 +63,20 @@ def _named(what: str) -> tuple[Scene, dict[str, Any]]:
         return scene_named(what, beside(Path())), {}
     study = Study.from_toml(path)
     return study.problem, {**next(study.cases()).values, **study.kind.begins}
+
+
+def doubts_of(scene: Scene, values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return messages on materials whose numbers are probably in a wrong unit.
+
+    Raises
+    ------
+    ModelError
+        if a parameter is refused
+    """
+    parameters = build(scene, values)
+    drawn = scene.sketch(parameters) if scene.sketch else None
+    try:
+        bodies = (drawn or scene.model(parameters)).bodies
+    except NotImplementedError:  # no bodies are known before it is computed
+        return ()
+    return doubts({body.name: body.material for body in bodies})

@@ -28,7 +28,7 @@ LAYERS = {
         "client",
     ),
     "residua": (
-        "neighbours", "status", "progress", "keys", "slurm", "commands",
+        "status", "progress", "keys", "slurm", "commands",
         "arguments", "cli", "__main__",
     ),
 }  # fmt: skip

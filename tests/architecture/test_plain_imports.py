@@ -25,7 +25,7 @@ DOORS = {
         "solver/late.py: Late.__call__",  # a scene names what computes it
         "solver/results/quantities.py: Quantities._all",  # what is declared, once it is asked for
         "solver/results/outputs.py: outputs",
-        "solver/results/export.py: to_meshio",  # a library that nothing else needs
+        "solver/results/mesh_fields.py: to_meshio",  # a library that nothing else needs
     },
 }
 """The functions of a package that import; a package that is not here may import in others too."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.materials import Material
 from solver.model.friction import Coulomb
 from solver.rolling.load import RollingLoad

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.audit.plain import GHOST, PlainBody
-from solver.audit.stretched import nominal
+from solver.audit.plain import GHOST, PlainBody, nominal
 from solver.mesh.rounding import ROUNDED
 from solver.tensors import SQRT2
 

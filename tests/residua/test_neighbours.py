@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from residua.neighbours import NEIGHBOURS, wrong_package
+from residua.cli import NEIGHBOURS, wrong_package
 from tests.architecture.sources import PACKAGES, ROOT
 from tests.counted import counted
 
@@ -77,7 +77,7 @@ def test_a_package_reached_by_a_link_is_no_stranger(tmp_path: Path) -> None:
 
 
 def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("residua.neighbours.NEIGHBOURS", ("solver", "no_such_package"))
+    monkeypatch.setattr("residua.cli.NEIGHBOURS", ("solver", "no_such_package"))
     assert wrong_package() == (
         "Python finds no package 'no_such_package'; this command needs the one at "
         f"{ROOT / 'no_such_package'}"
@@ -86,7 +86,7 @@ def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_check_imports_none_of_them_and_takes_milliseconds() -> None:
     code = (
-        "import sys; from residua.neighbours import wrong_package; assert not wrong_package();"
+        "import sys; from residua.cli import wrong_package; assert not wrong_package();"
         f"assert not {set(NEIGHBOURS)!r} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)

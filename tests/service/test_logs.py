@@ -18,9 +18,9 @@ from service import logs
 from service.app import check_port, create_app, serve
 from service.settings import Settings
 from studies import StoreFull
+from studies.execution.executor import Limits
 from studies.execution.forks import SHARED
 from studies.execution.grid import Grid
-from studies.execution.limits import Limits
 from studies.execution.workers import own_workers
 from tests.architecture.sources import ROOT
 from tests.service.servers import Server, fake_study

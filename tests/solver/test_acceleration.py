@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver.loading.acceleration import Series
+from solver.loading.step import Series
 
 
 def steps_needed(M, *, mixed=True, most=300, share=lambda iteration: 1.0):

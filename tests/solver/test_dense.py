@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import hilbert
 
-from solver.linear.dense import RefinedLU
+from solver.linear.iterative import RefinedLU
 
 
 @pytest.mark.parametrize("size", [3, 200])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.fem.dofs import Dofs, vectors
+from solver.fem.nodes import Dofs, vectors
 
 
 @pytest.mark.parametrize("dim", [2, 3])

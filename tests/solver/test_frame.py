@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.fem.frame import MovingFrame, RigidMotion, turning
+from solver.fem.rigid import MovingFrame, RigidMotion, turning
 
 FRAME = MovingFrame(centre=np.array([2.0, -1.0]), radius=5.0)
 X = np.array([[2.0, 4.0, -3.0], [-1.0, 0.5, 2.5]])

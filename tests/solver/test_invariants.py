@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.results.invariants import INVARIANTS, component, known_components, principal_of
-from solver.tensors import components
+from solver.tensors import INVARIANTS, component, components, known_components, principal_of
 
 
 @pytest.mark.parametrize("count", [4, 6])

@@ -12,7 +12,7 @@ import pytest
 from solver import Body, Material, Model, PathControl, System, Walker
 from solver.fem.deformation import Deformation
 from solver.fem.discretisation import Discretisation
-from solver.fem.dofs import vectors
+from solver.fem.nodes import vectors
 from solver.mesh import grid
 from solver.model.loads import Displacement
 from solver.tensors import SQRT2, to_tensor

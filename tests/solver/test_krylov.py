@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.linear.krylov import gmres
+from solver.linear.iterative import gmres
 
 Array = NDArray[np.float64]
 

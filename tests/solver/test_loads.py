@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, ModelError, System, Walker, solve
-from solver.loading.control import Control
-from solver.loading.program import Lap, Program, Stage
+from solver.loading.program import Control, Lap, Program, Stage
 from solver.mesh import grid
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Displacement, Gravity, InitialStress, Pressure, Temperature, Traction

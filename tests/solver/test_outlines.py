@@ -7,7 +7,7 @@ import pytest
 from skfem import MeshTri
 
 from solver.mesh import grid
-from solver.results.outlines import closed_curves
+from solver.results.maps import closed_curves
 
 
 def area(curve: np.ndarray) -> float:

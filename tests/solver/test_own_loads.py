@@ -14,8 +14,7 @@ import solver.fem.loads
 from solver import Body, ContactPair, LimitLoad, Material, Model, ModelError, System, solve
 from solver.fem.discretisation import Discretisation
 from solver.fem.substructure import Substructure
-from solver.loading.control import Control
-from solver.loading.program import Stage
+from solver.loading.program import Control, Stage
 from solver.loading.stepper import Stepper
 from solver.mesh import grid
 from solver.mesh.elements import element_type, known_elements

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver.contact.system import System
-from solver.loading.control import Control
 from solver.loading.prediction import Following, Predictor
+from solver.loading.program import Control
 from solver.loading.walker import Walker
 from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 

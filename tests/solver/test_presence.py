@@ -23,7 +23,7 @@ from solver import (
     System,
     solve,
 )
-from solver.loading.freed import check_freed
+from solver.loading.checks import check_freed
 from solver.mesh import grid
 from solver.model.rigid import arc
 from solver.rolling.scenes.rolling import ROLLING

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from solver import Amplitude, Body, ContactPair, Coulomb, Material, Model, ModelError, Stage, solve
-from solver.loading.control import PathControl
+from solver.loading.program import PathControl
 from solver.mesh import graded, grid
 from solver.model.rigid import Moved, Pushed, RigidBody, RigidSurface, arc, line
 from solver.results.increments import curve

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Material, Model, Solution, solve
-from solver.loading.control import PathControl
+from solver.loading.program import PathControl
 from solver.mesh import graded, grid
 from solver.model.rigid import Moved, RigidBody, arc
 

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver.results.acting import Acting
+from solver.results.acting import Acting, ContactResult
 from solver.results.contact import STICK_FRACTION, STICK_HALF_WIDTH, stick, stick_half_width
-from solver.results.contact_result import ContactResult
 
 
 def points(x, closed, sticking):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from skfem import CellBasis, ElementHex1, ElementHex2, MeshHex, MeshHex2
 
-from solver.fem.kinematics import mean_dilatation, rigid_motions, strain_operator
+from solver.fem.deformation import mean_dilatation, rigid_motions, strain_operator
 from solver.materials import Material
 from solver.tensors import SQRT2, deviator, to_tensor, von_mises
 

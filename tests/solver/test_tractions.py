@@ -7,8 +7,7 @@ import pytest
 
 from solver import Body, Material, Model, System
 from solver.mesh import grid
-from solver.results.acting import acting_on
-from solver.results.contact_result import contact_patches
+from solver.results.acting import acting_on, contact_patches
 
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 

@@ -25,7 +25,7 @@ from solver.contact.state import ContactState
 from solver.contact.system import System
 from solver.contact.turning import turning
 from solver.errors import NotConverged
-from solver.fem.frame import MovingFrame
+from solver.fem.rigid import MovingFrame
 from solver.mesh import grid
 from solver.model.rigid import line
 from solver.typing import Array

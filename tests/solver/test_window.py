@@ -12,9 +12,9 @@ from solver.errors import LimitLoad
 from solver.fem.window import Region, Windowed
 from solver.linear.solvers import Singular
 from solver.loading import narrowing, stepper
-from solver.loading.control import Control
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed
+from solver.loading.program import Control
 from solver.loading.walker import Walker
 from solver.rolling.scenes.rolling import ROLLING, RollingParameters
 from solver.scenes.punch import PUNCH, PunchParameters

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from studies.execution.proof import Unfit
+from studies.execution.task import Unfit
 
 
 def nap(

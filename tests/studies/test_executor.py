@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 from studies import Store, StudyEvent, open_study, run_study
-from studies.execution.executor import Event, Finished, Function, Message, StopCheck
-from studies.execution.limits import Limits
+from studies.execution.executor import Event, Finished, Function, Limits, Message, StopCheck
 from tests.studies.conftest import fake_study, results_of
 
 

@@ -25,7 +25,7 @@ from studies import Bounds, Store, Study, StudyError, StudyEvent, estimate, open
 from studies.definition.identity import solver_hash
 from studies.definition.neighbours import Neighbours
 from studies.execution.asking import Asking
-from studies.execution.limits import Limits
+from studies.execution.executor import Limits
 from studies.execution.result import answered
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk

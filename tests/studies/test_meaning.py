@@ -10,8 +10,8 @@ import pytest
 
 import solver
 import studies.definition.identity
-from studies.definition import meaning as module
-from studies.definition.meaning import digests_of, meaning
+from studies.definition import identity as module
+from studies.definition.identity import digests_of, meaning
 
 LAW = '''"""Return mapping."""
 

@@ -15,8 +15,7 @@ import pytest
 from solver.shipped import SCENES
 from studies import Store, Study
 from studies.definition.identity import solver_hash, written
-from studies.execution.proof import Unfit
-from studies.execution.task import PathTask, walk
+from studies.execution.task import PathTask, Unfit, walk
 
 SCRIPT = '''"""A scene."""
 

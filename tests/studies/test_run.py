@@ -12,8 +12,7 @@ import pytest
 from residua.cli import main
 from studies import Store, Study, StudyEvent, StudyOutcome, open_study, run_study
 from studies.definition.identity import solver_hash
-from studies.execution.proof import Unfit
-from studies.execution.task import PathTask, walk
+from studies.execution.task import PathTask, Unfit, walk
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.fakes import FAKE, INCREMENTS, FakeParameters
 

@@ -14,8 +14,7 @@ from residua.cli import main
 from residua.progress import ALONE
 from studies import Store, StudyEvent, open_study, run_study
 from studies.errors import StudyError
-from studies.execution.executor import Here
-from studies.execution.limits import Limits
+from studies.execution.executor import Here, Limits
 from studies.execution.run import _Work
 from tests.studies.conftest import fake_study
 

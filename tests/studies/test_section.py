@@ -17,15 +17,14 @@ from solver import Material, ModelError
 from solver.contact.state import BodyState
 from solver.materials.state import PlasticState
 from solver.results.acting import Acting
-from solver.results.export import to_meshio
 from solver.results.extremes import residual_extremes
-from solver.results.fields import SystemFields
+from solver.results.fields import Samples, SystemFields
 from solver.results.maps import isochromatics, maps, profiles, surfaces
+from solver.results.mesh_fields import to_meshio
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.record import Status
 from solver.results.requested import RequestedNumber
 from solver.results.run import FinishedRun
-from solver.results.samples import Samples
 from solver.results.view import ACROSS_TRACK, NOWHERE, Places, View
 from solver.scenes.driver import _labelled, _merged
 from solver.shipped import SCENES

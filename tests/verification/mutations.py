@@ -20,11 +20,11 @@ import solver.loading.stepper
 from solver.contact import candidates, complementarity
 from solver.contact.problem import OPEN, STICK, ContactSolution
 from solver.contact.system import System
-from solver.fem import kinematics, substructure
+from solver.fem import discretisation, substructure
 from solver.fem.deformation import PartResponse, SmallStrain
 from solver.fem.discretisation import Discretisation
 from solver.fem.wheel import Wheel
-from solver.loading.control import Tolerances
+from solver.loading.program import Tolerances
 from solver.materials import Chaboche, PlasticState
 from solver.model.body import Body
 from solver.model.friction import BoundLines
@@ -210,9 +210,9 @@ def forgotten_flow(patch: Patch) -> None:
 
 
 def no_hoop_strain(patch: Patch) -> None:
-    operator = kinematics.strain_operator
+    operator = discretisation.strain_operator
     patch.setattr(
-        kinematics, "strain_operator", lambda v, g, r, state: operator(v, g, r, "plane_strain")
+        discretisation, "strain_operator", lambda v, g, r, state: operator(v, g, r, "plane_strain")
     )
 
 

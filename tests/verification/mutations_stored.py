@@ -24,12 +24,10 @@ import solver.fem.discretisation
 import solver.fem.fields
 import solver.loading.walker
 import solver.results.acting
-import solver.results.contact_result
 import solver.results.extremes
 import solver.results.fields
 import solver.results.increments
 import solver.results.places
-import solver.results.samples
 import solver.results.shakedown
 import solver.results.singularity
 import solver.rolling.results.plane
@@ -38,15 +36,13 @@ import solver.rolling.scenes.rolling_setup
 from solver.contact.candidates import Candidates
 from solver.contact.interface import Interface
 from solver.fem.fields import Sampler
-from solver.fem.loads import Superposed
-from solver.fem.softening import Softening
-from solver.model.contact_pair import ContactPair
+from solver.fem.loads import Softening, Superposed
 from solver.model.loads import InitialStress, Load, Temperature
-from solver.results.contact_result import ContactResult
-from solver.results.fields import SystemFields
+from solver.model.pairs import ContactPair
+from solver.results.acting import ContactResult
+from solver.results.fields import Samples, SystemFields
 from solver.results.requested import RequestedNumber
 from solver.results.run import FinishedRun
-from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
 from solver.results.view import Axis, Places, View
 from solver.rolling.plane.layers import Layers
@@ -370,7 +366,7 @@ def pressure_times(factor: float) -> Fault:
     def make(old: Any) -> Any:
         return lambda *a, **k: tuple(factor * each for each in old(*a, **k))
 
-    return instead(solver.results.contact_result, "contact_pressure", make)
+    return instead(solver.results.acting, "contact_pressure", make)
 
 
 def acting_otherwise(**changes: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -18,10 +18,10 @@ from solver.contact.geometry import pair
 from solver.contact.problem import OPEN
 from solver.contact.state import ContactState, Converged, State
 from solver.loading.increment import Increment
-from solver.materials.material import Material
+from solver.materials.elastic_plastic import Material
 from solver.model.amplitude import Amplitude
-from solver.model.contact_pair import ContactPair
-from solver.model.motion import Axle
+from solver.model.body import Axle
+from solver.model.pairs import ContactPair
 from solver.rolling.passing import passing
 from solver.rolling.plane.track import Track, under_load
 from solver.rolling.plane.wheel import flowed

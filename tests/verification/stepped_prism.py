@@ -31,7 +31,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
-from solver.linear.krylov import gmres
+from solver.linear.iterative import gmres
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
 from solver.rolling.flow import PARTS, allowed_inflow, sweep_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Body, ContactPair, Model, Solution, Traction, solve
-from solver.loading.control import PathControl
+from solver.loading.program import PathControl
 from solver.mesh import grid
 from solver.mesh.elements import known_elements
 from solver.tensors import to_tensor

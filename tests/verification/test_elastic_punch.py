@@ -10,7 +10,7 @@ import pytest
 from solver import Record, Status, solve
 from solver.contact.problem import FORWARD
 from solver.errors import ModelError
-from solver.loading.control import PathControl
+from solver.loading.program import PathControl
 from solver.results.singularity import fit_singularity
 from studies.scenes.registry import scene_named
 from tests.records import kept

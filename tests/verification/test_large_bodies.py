@@ -25,10 +25,10 @@ from solver import (
     Traction,
     solve,
 )
-from solver.fem.dofs import vectors
 from solver.fem.large import LargeDiscretisation
 from solver.fem.log_strain import _Stretch
-from solver.loading.control import Tolerances
+from solver.fem.nodes import vectors
+from solver.loading.program import Tolerances
 from solver.materials import Chaboche, Elasticity, Voce
 from solver.mesh import grid
 from solver.model.loads import Centrifugal

@@ -21,7 +21,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.materials.law import Law
 from solver.rolling.passing import Pass, passing
 from solver.rolling.rail.flow import PrismState

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.errors import ModelError, NotConverged, WindowTooSmall
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch_contact import PatchContact

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.errors import ModelError
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.mesh import grid
 from solver.rolling.audit.rail import audit_prism
 from solver.rolling.passing import passing

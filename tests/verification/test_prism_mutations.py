@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.audit.report import Audit
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.materials import Material
 from solver.mesh import grid, within
 from solver.model.friction import BoundLines

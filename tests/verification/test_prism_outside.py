@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.mesh import grid, within
 from solver.rolling.audit import plain_rail as plain_prism
 from solver.rolling.audit.plain_rail import PlainPrism

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.errors import WindowTooSmall
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.materials import (
     ArmstrongFrederick,
     Chaboche,

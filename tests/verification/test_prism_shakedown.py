@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch_contact import EllipticPatch

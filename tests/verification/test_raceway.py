@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from solver import ModelError, Record
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.results.record import Status
 from solver.results.shakedown import QUIET, ShakedownState
 from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch_contact import EllipticPatch
-from solver.rolling.scenes.hertz_ellipse import HertzEllipse
-from solver.rolling.scenes.raceway import MOST_LONG, RacewayParameters
+from solver.rolling.scenes.raceway import MOST_LONG, HertzEllipse, RacewayParameters
 from solver.rolling.scenes.raceway_setup import RolledRaceway, geometry, track_of
 from solver.shipped import SCENES
 from tests.records import kept

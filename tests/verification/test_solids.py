@@ -12,12 +12,12 @@ from skfem import ElementHexS2, MeshHex, MeshQuad, MeshTet
 from solver import Body, ContactPair, Material, Model, ModelError, PathControl, Stage, solve
 from solver.audit.report import audit
 from solver.fem.discretisation import Discretisation
-from solver.fem.dofs import vectors
+from solver.fem.nodes import vectors
 from solver.mesh import grid
 from solver.mesh.elements import ELEMENTS, ElementType
 from solver.model.amplitude import Amplitude
-from solver.model.link import Link
 from solver.model.loads import Displacement, Gravity, Traction
+from solver.model.pairs import Link
 from solver.model.singular import SingularPoint
 
 E, NU, YIELD, SLOPE = 2e5, 0.3, 300.0, 1e4

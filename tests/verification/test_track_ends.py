@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from solver import System, Walker
-from solver.loading.control import Control, Tolerances
+from solver.loading.program import Control, Tolerances
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import Track
 from solver.rolling.scenes.rolling import RollingParameters

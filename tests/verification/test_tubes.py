@@ -24,8 +24,7 @@ from solver import (
     Walker,
     solve,
 )
-from solver.loading.control import Control
-from solver.loading.program import Lap
+from solver.loading.program import Control, Lap
 from solver.mesh import grid
 from tests.reference.autofrettage import PlasticTube, Steel
 from tests.reference.bar import ConstrainedBar

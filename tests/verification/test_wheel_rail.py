@@ -11,7 +11,7 @@ from scipy.optimize import fsolve
 from scipy.spatial import cKDTree
 
 from solver import ModelError, Record
-from solver.results.export import to_meshio
+from solver.results.mesh_fields import to_meshio
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.rolling.rail.track import PrismField

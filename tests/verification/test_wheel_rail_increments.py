@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.rolling.passing import Pass, passing
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.track import PrismTrack

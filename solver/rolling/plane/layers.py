@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.materials.elasticity import Elasticity
-from solver.rolling.body import LeftState
+from solver.rolling.load import LeftState
 from solver.typing import Array
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from solver.errors import ModelError
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.materials.law import Law
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.passing import TOLERANCE, Pass, SolveBudget

@@ -20,8 +20,8 @@ from solver.linear import solvers as linear
 from solver.linear.schur import SchurComplement
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
-from solver.rolling.body import FlowPast
 from solver.rolling.flow import Flow, allowed_inflow, flow_of
+from solver.rolling.load import FlowPast
 from solver.rolling.plane.layers import Layers
 from solver.typing import Array, Bools, Ints
 

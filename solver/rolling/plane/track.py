@@ -13,17 +13,16 @@ from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.loads import moving_forces
 from solver.fem.surface import Surface, extract
+from solver.materials.elastic_plastic import Material
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
-from solver.materials.material import Material
 from solver.materials.state import PlasticState
 from solver.memory import kept
 from solver.mesh.grids import grid, within
 from solver.model.amplitude import Amplitude
 from solver.model.body import Body
 from solver.model.loads import TravellingPressure
-from solver.rolling.body import LOADED, RELEASED
-from solver.rolling.load import Given
+from solver.rolling.load import LOADED, RELEASED, Given
 from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.lines import MOST_COLUMNS, track_lines, window_depth, window_elements

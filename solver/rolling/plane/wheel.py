@@ -28,8 +28,8 @@ from solver.contact.geometry import pair
 from solver.contact.problem import OPEN, ContactProblem, ContactSolution
 from solver.errors import NoContact, NotConverged, WindowTooSmall
 from solver.fem.discretisation import Discretisation
-from solver.fem.frame import turning
 from solver.fem.operators import operators_of
+from solver.fem.rigid import turning
 from solver.fem.surface import Surface, extract
 from solver.fem.wheel import Wheel
 from solver.model.body import Body

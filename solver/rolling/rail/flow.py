@@ -9,9 +9,8 @@ import numpy as np
 
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
-from solver.rolling.body import FlowPast, LeftState
 from solver.rolling.flow import allowed_inflow, sweep_of
-from solver.rolling.load import Given
+from solver.rolling.load import FlowPast, Given, LeftState
 from solver.rolling.passing import passing
 from solver.rolling.rail.modes import Modes
 from solver.typing import Array, Ints

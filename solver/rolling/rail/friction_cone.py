@@ -25,7 +25,7 @@ import numpy as np
 
 from solver.errors import NoContact
 from solver.late import late
-from solver.linear.dense import RefinedLU
+from solver.linear.iterative import RefinedLU
 from solver.model.friction import BoundLines, PatchStatus
 from solver.rolling.passing import searched
 from solver.typing import Array, Ints

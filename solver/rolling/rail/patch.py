@@ -25,7 +25,7 @@ from typing import Any, Self
 import numpy as np
 
 from solver.errors import ModelError, NoContact, Spins, WindowTooSmall
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.model.friction import BoundLines, FrictionLaw, pressure_lines
 from solver.rolling.load import FULL_SLIP, spinning
 from solver.rolling.rail.friction_cone import (

@@ -28,7 +28,7 @@ from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.fem.assembly import Assembly
-from solver.fem.kinematics import strain_operator
+from solver.fem.deformation import strain_operator
 from solver.fem.nodes import Nodes
 from solver.fem.surface import edges_of
 from solver.materials import Material

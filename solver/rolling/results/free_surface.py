@@ -40,7 +40,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.fem.discretisation import Discretisation
-from solver.fem.dofs import vectors
+from solver.fem.nodes import vectors
 from solver.fem.surface import edges_of
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.tensors import SQRT2

@@ -10,9 +10,8 @@ from scipy.spatial import cKDTree
 
 from solver.contact.state import BodyState
 from solver.fem.fields import Sampler, recovery
-from solver.fem.frame import RigidMotion
-from solver.results.acting import Acting
-from solver.results.contact_result import contact_patches
+from solver.fem.rigid import RigidMotion
+from solver.results.acting import Acting, contact_patches
 from solver.results.stress_cycle import StressCycle
 from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers

@@ -23,7 +23,7 @@ from solver.model.body import Body
 from solver.results.acting import Acting
 from solver.results.mesh_fields import MeshFields, counterclockwise
 from solver.results.stress_cycle import StressCycle
-from solver.rolling.body import LOADED, RELEASED
+from solver.rolling.load import LOADED, RELEASED
 from solver.rolling.passing import Pass
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import PatchContact

@@ -17,9 +17,9 @@ from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.materials.law import Law
 from solver.results.acting import Acting
+from solver.results.fields import Samples
 from solver.results.mesh_fields import MeshFields
 from solver.results.run import FinishedRun
-from solver.results.samples import Samples
 from solver.results.view import View
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.results.stage import SteadyBody

@@ -11,10 +11,10 @@ import numpy as np
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.results.acting import axle_of
+from solver.results.fields import Samples
 from solver.results.maps import PROFILE_PLASTIC_STRAIN, RESIDUAL_PROFILE
 from solver.results.quantities import declare
 from solver.results.run import Values
-from solver.results.samples import Samples
 from solver.results.shakedown import Shakedown, ShakedownState, classify
 from solver.tensors import SQRT2, to_mandel
 from solver.typing import Array

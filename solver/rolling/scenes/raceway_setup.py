@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from solver.errors import ModelError
-from solver.loading.bearing import uncarried
+from solver.loading.checks import uncarried
 from solver.memory import kept
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values

@@ -13,11 +13,11 @@ import numpy as np
 
 from solver.audit.report import Audit
 from solver.errors import LimitLoad, ModelError, NotConverged
-from solver.linear.threads import one_thread
+from solver.linear.solvers import one_thread
 from solver.memory import kept
 from solver.results.acting import Acting
+from solver.results.fields import Samples
 from solver.results.run import FinishedRun
-from solver.results.samples import Samples
 from solver.results.view import View
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism

@@ -84,12 +84,12 @@ def rail_scene(
         outputs=(
             *late("results.maps", "maps", "profiles"),
             *late("results.extremes", "residual_extremes"),
-            *late("results.figures", "extremes"),
+            *late("results.extremes", "extremes"),
             *late("rolling.scenes.rail_outputs", "patch", "section"),
             *outputs,
         ),
         costs=(
-            *late("results.figures", "cost"),
+            *late("results.extremes", "cost"),
             *late("rolling.scenes.rail_outputs", "accuracy"),
         ),
         warnings=late("rolling.scenes.rail_outputs", "undecided")[0],

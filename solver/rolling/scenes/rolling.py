@@ -24,11 +24,10 @@ from annotated_types import Interval, Unit
 from solver.errors import ModelError
 from solver.late import late
 from solver.loading.program import HALVINGS
-from solver.materials.material import Material
+from solver.materials.elastic_plastic import Material
 from solver.parameters import Accuracy, Length, Other, by_accuracy, described
 from solver.rolling.plane.lines import MOST_COLUMNS, window_elements
-from solver.rolling.scenes.schedule import Schedule
-from solver.rolling.scenes.sequence import block_of
+from solver.rolling.scenes.schedule import Schedule, block_of
 from solver.rolling.scenes.wheel_parameters import WheelParameters, check_given_shear
 from solver.scenes.scene import Scene
 
@@ -341,10 +340,10 @@ ROLLING = Scene(
         *late("results.extremes", "residual_extremes"),
         *late("rolling.scenes.rolling_setup", "profile_figures", "surface"),
         *late("results.contact", "contact"),
-        *late("results.figures", "extremes"),
+        *late("results.extremes", "extremes"),
         *late("rolling.scenes.rolling_setup", "wheel", "cycles"),
     ),
-    costs=(*late("results.figures", "cost"), *late("rolling.scenes.rolling_setup", "progress")),
+    costs=(*late("results.extremes", "cost"), *late("rolling.scenes.rolling_setup", "progress")),
     trace=_trace,
     refinement=_refinement,
     increment_error=math.inf,  # increments are those of `advance_step`, see `refinement`

@@ -13,16 +13,16 @@ import numpy as np
 
 from solver.audit.report import Audit
 from solver.errors import LimitLoad, ModelError, NotConverged, Spins
-from solver.linear.threads import one_thread
-from solver.loading.bearing import uncarried
-from solver.materials.material import Material
+from solver.linear.solvers import one_thread
+from solver.loading.checks import uncarried
+from solver.materials.elastic_plastic import Material
 from solver.memory import kept
 from solver.model.amplitude import Amplitude
+from solver.model.body import Axle
 from solver.model.friction import effective_friction
-from solver.model.motion import Axle
 from solver.results.acting import Acting, of_pressure
+from solver.results.fields import Samples
 from solver.results.run import FinishedRun
-from solver.results.samples import Samples
 from solver.results.shakedown import ShakedownState
 from solver.results.view import View
 from solver.rolling.audit.plane import audit_pass

@@ -9,13 +9,12 @@ import numpy as np
 from skfem import Mesh
 
 from solver.loading.program import HALVINGS
-from solver.materials.material import Material
+from solver.materials.elastic_plastic import Material
 from solver.mesh.grids import grid, grid_size, mapped, merged, within
 from solver.model.amplitude import Amplitude
-from solver.model.body import Body
+from solver.model.body import Axle, Body
 from solver.model.loads import TravellingPressure
 from solver.model.model import Model
-from solver.model.motion import Axle
 from solver.rolling.plane.lines import half_space_nodes, rim_elements, track_lines, wheel_nodes
 from solver.rolling.plane.track import CONTACT, half_space_body, standing_pressure
 from solver.rolling.scenes.rolling import RollingParameters

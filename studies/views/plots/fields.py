@@ -8,9 +8,8 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 import xarray as xr
 
-from solver.results.invariants import INVARIANTS
-from solver.results.invariants import component as derived
-from solver.tensors import AXES, components
+from solver.tensors import AXES, INVARIANTS, components
+from solver.tensors import component as derived
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
 from studies.numbers import rounding

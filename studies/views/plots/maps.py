@@ -19,8 +19,7 @@ from matplotlib.transforms import ScaledTranslation
 from matplotlib.tri import Triangulation
 
 from solver.model.friction import PatchStatus
-from solver.results.invariants import PRINCIPAL, principal_of
-from solver.tensors import AXES
+from solver.tensors import AXES, PRINCIPAL, principal_of
 from studies.errors import StudyError
 from studies.numbers import number_text
 from studies.views.columns import COMPUTED

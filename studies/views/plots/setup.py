@@ -18,8 +18,8 @@ from matplotlib.ticker import MaxNLocator
 from skfem import Mesh
 
 from solver.model.body import Body
-from solver.model.link import Link
 from solver.model.model import Model
+from solver.model.pairs import Link
 from solver.model.rigid import RigidBody
 from solver.results.named_places import NamedPlaces
 from solver.results.view import View

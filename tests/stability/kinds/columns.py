@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from solver import Material, PathControl
-from solver.loading.control import Tolerances
+from solver.loading.program import Tolerances
 from tests.stability.closed import Column, judge_column
 from tests.stability.kinds.draws import RULES
 from tests.stability.trial import Scene, brief, tells

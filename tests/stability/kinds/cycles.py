@@ -13,8 +13,8 @@ import numpy as np
 
 from solver import Body, Material, Model, System
 from solver.contact.state import Converged
-from solver.loading.control import Control
 from solver.loading.outcome import PathEnded
+from solver.loading.program import Control
 from solver.loading.stepper import Stepper
 from solver.mesh import grid
 from tests.stability.kinds.reopening import beam, bend, judge

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from solver import Material, Solution
-from solver.loading.control import Tolerances
+from solver.loading.program import Tolerances
 from tests.stability.closed import STEEL, Column, judge_column, lowered
 from tests.stability.trial import Figure, Scene, brief, tells
 

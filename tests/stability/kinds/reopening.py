@@ -9,8 +9,8 @@ import numpy as np
 
 from solver import Body, ContactPair, Material, Model, PathControl, Solution, System, solve
 from solver.contact.state import Converged
-from solver.loading.control import Control
 from solver.loading.outcome import PathEnded
+from solver.loading.program import Control
 from solver.loading.stepper import Stepper
 from solver.mesh import grid
 from tests.stability.balance import mean_gaps

@@ -92,7 +92,7 @@ RUN = """
 import json, sys, tempfile
 from pathlib import Path
 import meshio
-from solver.results.export import write_vtu
+from solver.results.mesh_fields import write_vtu
 from studies.errors import SceneError
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene

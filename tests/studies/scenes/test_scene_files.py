@@ -25,7 +25,7 @@ from service.settings import Settings
 from solver import SCENES, ModelError, Record, Status, System
 from solver.errors import LimitLoad
 from solver.mesh.elements import ELEMENTS, ElementType
-from solver.results.export import write_vtu
+from solver.results.mesh_fields import write_vtu
 from solver.scenes.punch import PUNCH, PunchParameters
 from studies import Store, Study, StudyError, open_study, run_study, scene_schema
 from studies.errors import SceneError

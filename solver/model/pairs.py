@@ -1,16 +1,18 @@
-"""Two boundaries that may touch."""
+"""What joins two boundaries: contact pairs, which may touch, and links."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.model.amplitude import Amplitude
 from solver.model.friction import Coulomb, FrictionLaw
-from solver.parameters import Coordinate, Friction, check
+from solver.parameters import Coordinate, Friction, Infinite, check
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +24,7 @@ class ContactPair:
     slave, master : ``(body name, boundary name)``. Gap, slip, pressure and shear are defined at the
         vertices of the slave: the mean gap around each vertex must not be negative. Choose as slave
         the surface that ends at a corner, else the finer one or the one that yields. The two are
-        exchanged if the slave is unsuitable (`solver.contact.slave`)
+        exchanged if the slave is unsuitable (`solver.contact.interface`)
     friction : Coulomb coefficient; zero, or a value that counts as zero (`effective_friction`),
         leaves out the tangential unknowns. Or a law of friction, as `Coulomb` with cohesion and a
         limit of shear
@@ -80,3 +82,71 @@ class ContactPair:
             return None
         was, now = self.presence.at(before), self.presence.at(time)
         return None if now > 0 and now >= was else now / (was or 1.0)
+
+
+Components = Literal["x", "y", "xy", "normal", "tangential"]
+Springs = Annotated[float, Interval(gt=0.0), Unit("N/mm3")]
+Side = tuple[str, str]
+"""Name of a body and of its boundary."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """Linear conditions on the displacements of a boundary, the slave.
+
+    Without ``rigid`` and ``master`` all nodes of the slave have the same displacement; with a
+    stiffness, springs hold the slave to the ground instead.
+
+    Attributes
+    ----------
+    slave : body and boundary
+    master : body and boundary to which the slave is tied; their nodes need not match
+    rigid : the rigid body whose motion the slave follows; with a master, the motion of the slave
+        relative to the master, such as the shortening of a bolt. Rotations are small
+    components : components of the displacement in the conditions: along the axes, or along the
+        normal or the tangent of the slave at each node. At a corner the normal is the mean of both
+        sides
+    stiffness : stiffness of springs between the two, force per area and displacement [N/mm3]; inf
+        is rigid
+    distributed : whether only the mean motion of the slave equals that of ``rigid``: force and
+        moment act on the slave by a linear traction, and the slave may deform. In axisymmetric
+        bodies it is the mean motion along y, and the traction is constant
+    """
+
+    slave: Side
+    master: Side | None = None
+    rigid: str | None = None
+    components: Components = "xy"
+    stiffness: Springs | Infinite = math.inf
+    distributed: bool = False
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.local and (self.master or self.distributed):
+            allowed = "must be x, y or xy with a master, and where it is distributed"
+            raise ModelError("components", self.components, allowed)
+        if self.distributed and (
+            self.rigid is None or self.master or math.isfinite(self.stiffness)
+        ):
+            allowed = "needs a rigid body, and neither a master nor springs"
+            raise ModelError("distributed", self.distributed, allowed)
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Its components along axes: 0 (x), 1 (y); empty for a `local` link."""
+        return () if self.local else tuple("xy".index(axis) for axis in self.components)
+
+    @property
+    def local(self) -> bool:
+        """Whether its component is along the normal or the tangent of the slave."""
+        return self.components in ("normal", "tangential")
+
+    @property
+    def grounded(self) -> bool:
+        """Whether springs hold the slave to the ground."""
+        return self.rigid is None and self.master is None and math.isfinite(self.stiffness)
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """The slave, and the master if there is one."""
+        return (self.slave,) if self.master is None else (self.slave, self.master)
