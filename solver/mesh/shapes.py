@@ -23,6 +23,8 @@ from solver.parameters import Checked, Coordinate, Length, require
 from solver.typing import Array
 
 Pair = tuple[Coordinate, Coordinate]
+Lengths = tuple[Length, Length]
+Angles = tuple[Annotated[float, Unit("deg")], Annotated[float, Unit("deg")]]
 Growth = Annotated[float, Interval(gt=1.0, le=3.0)]
 Radius = Annotated[float, Interval(ge=0.0, le=1e6), Unit("mm")]
 
@@ -52,8 +54,8 @@ def rectangle(
     x: Pair,
     y: Pair,
     *,
-    size: float,
-    growth: float = 1.3,
+    size: Length,
+    growth: Growth = 1.3,
     near: Sequence[Near] = (),
     cells: str = "quad",
 ) -> Mesh:
@@ -71,10 +73,10 @@ def rectangle(
 
 
 def half_plane(
-    extent: float,
+    extent: Length,
     *,
-    size: float,
-    growth: float = 1.3,
+    size: Length,
+    growth: Growth = 1.3,
     near: Sequence[Near] = (),
     symmetric: bool = False,
     cells: str = "quad",
@@ -89,12 +91,12 @@ def half_plane(
 
 
 def pad(
-    width: float,
-    height: float,
-    radius: float,
+    width: Length,
+    height: Length,
+    radius: Length,
     *,
-    size: float,
-    growth: float = 1.3,
+    size: Length,
+    growth: Growth = 1.3,
     near: Sequence[Near] = (),
 ) -> Mesh:
     """Return a block above y = 0 whose bottom is an arc of ``radius`` that touches the origin.
@@ -117,12 +119,12 @@ def pad(
 
 
 def ring(
-    radii: Pair,
-    angles: Pair = (0.0, 360.0),
+    radii: Lengths,
+    angles: Angles = (0.0, 360.0),
     centre: Pair = (0.0, 0.0),
     *,
-    size: float,
-    growth: float = 1.3,
+    size: Length,
+    growth: Growth = 1.3,
     near: Sequence[Near] = (),
 ) -> Mesh:
     """Return the sector between two radii and between two angles [degrees].
@@ -160,13 +162,13 @@ def ring(
 
 
 def fillet(
-    wide: float,
-    narrow: float,
-    radius: float,
-    lengths: Pair,
+    wide: Length,
+    narrow: Length,
+    radius: Length,
+    lengths: Lengths,
     *,
-    size: float,
-    growth: float = 1.3,
+    size: Length,
+    growth: Growth = 1.3,
     near: Sequence[Near] = (),
 ) -> Mesh:
     """Return the half x >= 0 of a bar that narrows from ``wide`` to ``narrow`` over a fillet.
@@ -218,7 +220,7 @@ def fillet(
     })  # fmt: skip
 
 
-def disc(radius: float, centre: Pair = (0.0, 0.0), *, size: float) -> Mesh:
+def disc(radius: Length, centre: Pair = (0.0, 0.0), *, size: Length) -> Mesh:
     """Return a whole disc of nearly equal elements.
 
     Its boundaries are the rim and its quarters east, north, west and south.
@@ -257,12 +259,12 @@ def disc(radius: float, centre: Pair = (0.0, 0.0), *, size: float) -> Mesh:
 
 
 def ball(
-    radius: float,
+    radius: Length,
     at: Pair = (0.0, 0.0),
     *,
-    size: float,
-    fine: float,
-    growth: float = 1.3,
+    size: Length,
+    fine: Length,
+    growth: Growth = 1.3,
     above: bool = True,
     symmetric: bool = False,
 ) -> Mesh:
@@ -289,7 +291,7 @@ def ball(
     return renamed(bent, sides).translated(at)
 
 
-def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
+def ball_lines(radius: Length, fine: Length, size: Length, growth: Growth) -> Array:
     """Return the lines, from 0 on, of the grid that is mapped onto a ball [mm].
 
     Their spacing is ``size`` up to ``fine``, then it grows.
@@ -302,7 +304,7 @@ def ball_lines(radius: float, fine: float, size: float, growth: float) -> Array:
     return continued(even, extent - fine, size, growth, extent / 4)
 
 
-def _onto_disc(x: Array, radius: float) -> Array:
+def _onto_disc(x: Array, radius: Length) -> Array:
     """Map points (2, n) of a half-plane onto a disc in the same half-plane that touches y = 0.
 
     The Moebius map ``w = z / (1 - i z / 2 R)`` hardly moves points near the origin, and maps the

@@ -24,7 +24,7 @@ from studies.scenes.building import (
     mesh_of_body,
 )
 from studies.scenes.description import Description
-from studies.scenes.shape_tables import GridTable, RoundTable, lines_of
+from studies.scenes.shape_tables import LINED, lines_of
 
 _MOST_INCREMENTS = 200_000
 """Largest number of increments of a loading history."""
@@ -74,7 +74,7 @@ def effort_of(
 def too_large(scene: tables.SceneFile) -> Iterator[StudyError]:
     """Yield mistakes in shapes that are grids: those without lines, or with too many."""
     for name, body in scene.bodies.items():
-        if isinstance(body.shape, GridTable | RoundTable):
+        if body.shape and body.shape.kind in LINED:
             try:
                 lines_of(body.shape)
             except ModelError as error:
@@ -160,7 +160,7 @@ def _size_of(description: Description, name: str, body: tables.BodyTable) -> _Bo
     boxed = body.cuts or body.cracks or any(each.x or each.y for each in body.boundaries.values())
     try:
         lines = ""
-        if isinstance(body.shape, GridTable | RoundTable) and not boxed:
+        if body.shape and body.shape.kind in LINED and not boxed:
             lines = f"{body.shape.kind} {[len(each) for each in lines_of(body.shape)]}"
             leave = {*leave, "shape", "move", "regions"}
         key = lines + body.model_dump_json(exclude=leave)

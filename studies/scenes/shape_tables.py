@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from inspect import Parameter, signature
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, create_model
 from skfem import Mesh
 
 from solver.errors import ModelError
@@ -30,7 +31,7 @@ from solver.mesh.shapes import (
 )
 from solver.parameters import Coordinate, Length
 from solver.typing import Array
-from studies.scenes.table import Angles, Count, Place, SceneTable, Span
+from studies.scenes.table import Angles, Count, Place, SceneTable
 
 
 class NearTable(SceneTable):
@@ -42,90 +43,6 @@ class NearTable(SceneTable):
     at: Place
     size: Length
     radius: Radius = 0.0
-
-
-class _MeshedTable(SceneTable):
-    """Base of shapes with graded elements.
-
-    ``size`` is the largest element side, ``growth`` the ratio of neighbouring sides.
-    """
-
-    size: Length
-    growth: Growth = 1.3
-    near: tuple[NearTable, ...] = ()
-
-
-class RectangleTable(_MeshedTable):
-    """A rectangle of the spans ``x`` and ``y``: left, right, bottom, top."""
-
-    kind: Literal["rectangle"]
-    x: Span
-    y: Span
-
-
-class HalfPlaneTable(_MeshedTable):
-    """A rectangle below y = 0 of depth and half-width ``extent``; its right half if symmetric."""
-
-    kind: Literal["half_plane"]
-    extent: Length
-    symmetric: bool = False
-
-
-class PadTable(_MeshedTable):
-    """A block with a flat top and an arc through the origin as bottom: left, right, bottom, top."""
-
-    kind: Literal["pad"]
-    width: Length
-    height: Length
-    radius: Length
-
-
-class RingTable(_MeshedTable):
-    """A ring or sector between two radii and two angles [degrees]: inner, outer, start, end."""
-
-    kind: Literal["ring", "sector"]
-    centre: Place = (0.0, 0.0)
-    radii: tuple[Length, Length]
-    angles: Angles = (0.0, 360.0)
-
-
-class FilletTable(_MeshedTable):
-    """A bar that narrows from ``wide`` to ``narrow`` over a fillet at y = 0, its axis at x = 0.
-
-    ``lengths`` are those below and above y = 0. Boundaries: left (the axis), bottom, right (the
-    side of the wide part), surface, fillet, top. With ``near`` the whole fillet is fine.
-    """
-
-    kind: Literal["fillet"]
-    wide: Length
-    narrow: Length
-    radius: Length
-    lengths: tuple[Length, Length]
-
-
-class DiscTable(SceneTable):
-    """A disc with elements of one size: rim, and its quarters east, north, west, south."""
-
-    kind: Literal["disc"]
-    centre: Place = (0.0, 0.0)
-    radius: Length
-    size: Length
-
-
-class RoundTable(SceneTable):
-    """A disc that touches y = 0 at ``at`` and is fine there, without a cap on its far side.
-
-    Its boundaries are those of `solver.mesh.ball`.
-    """
-
-    kind: Literal["round"]
-    at: Place = (0.0, 0.0)
-    radius: Length
-    size: Length
-    fine: Length
-    growth: Growth = 1.3
-    above: bool = True
-    symmetric: bool = False
 
 
 class _MarkTable(SceneTable):
@@ -164,21 +81,31 @@ class GridTable(SceneTable):
     growth: Growth = 1.3
 
 
-Shape = Annotated[
-    RectangleTable
-    | GridTable
-    | HalfPlaneTable
-    | PadTable
-    | RingTable
-    | FilletTable
-    | DiscTable
-    | RoundTable,
-    Field(discriminator="kind"),
-]
-_MESHED: Mapping[str, Callable[..., Mesh]] = {
+SHAPES: Mapping[str, Callable[..., Mesh]] = {
     "rectangle": rectangle, "half_plane": half_plane, "pad": pad, "ring": ring, "sector": ring,
     "fillet": fillet, "disc": disc, "round": ball,
 }  # fmt: skip
+
+
+def _shape(word: str, make: Callable[..., Mesh]) -> type[SceneTable]:
+    """Return the table of a shape: the arguments of the function that makes its mesh."""
+    known: dict[str, Any] = {"kind": (Literal[word], ...)}
+    for name, each in signature(make, eval_str=True).parameters.items():
+        hint = tuple[NearTable, ...] if name == "near" else each.annotation
+        known[name] = (hint, ... if each.default is Parameter.empty else each.default)
+    known.pop("cells", None)
+    made: type[SceneTable] = create_model(f"{word}_shape", __base__=SceneTable, **known)
+    made.__doc__ = make.__doc__
+    return made
+
+
+if TYPE_CHECKING:
+    Shape = Any
+else:
+    _made = [_shape(word, make) for word, make in SHAPES.items()]
+    Shape = Annotated[Union[(GridTable, *_made)], Field(discriminator="kind")]
+LINED = ("grid", "round")
+"""Shapes of which `lines_of` tells the lines."""
 
 
 def mesh_of(shape: Any, cells: str) -> Mesh:
@@ -199,16 +126,16 @@ def mesh_of(shape: Any, cells: str) -> Mesh:
     given = {name: getattr(shape, name) for name in type(shape).model_fields if name != "kind"}
     if near := given.get("near"):
         given["near"] = [Near(**each.model_dump()) for each in near]
-    if isinstance(shape, RectangleTable | HalfPlaneTable):
+    if "cells" in signature(SHAPES[shape.kind]).parameters:
         given["cells"] = cells
     elif cells == "tri":
         raise ModelError("element", cells, f"a {shape.kind} is meshed with quadrilaterals")
-    return _MESHED[shape.kind](**given)
+    return SHAPES[shape.kind](**given)
 
 
-def lines_of(shape: GridTable | RoundTable) -> tuple[Array, Array]:
-    """Return the lines of the grid of a shape before it is bent, or raise `ModelError` [mm]."""
-    if isinstance(shape, RoundTable):
+def lines_of(shape: Any) -> tuple[Array, Array]:
+    """Return the grid lines of a shape of `LINED` before it is bent, or raise `ModelError` [mm]."""
+    if shape.kind == "round":
         y = ball_lines(shape.radius, shape.fine, shape.size, shape.growth)
         x = y if shape.symmetric else np.concatenate([-y[:0:-1], y])
     else:
