@@ -94,9 +94,7 @@ def _shape(word: str, make: Callable[..., Mesh]) -> type[SceneTable]:
         hint = tuple[NearTable, ...] if name == "near" else each.annotation
         known[name] = (hint, ... if each.default is Parameter.empty else each.default)
     known.pop("cells", None)
-    made: type[SceneTable] = create_model(f"{word}_shape", __base__=SceneTable, **known)
-    made.__doc__ = make.__doc__
-    return made
+    return create_model(f"{word}_shape", __base__=SceneTable, __doc__=make.__doc__, **known)
 
 
 if TYPE_CHECKING:

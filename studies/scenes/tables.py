@@ -147,13 +147,12 @@ def _unknown(material: Any) -> Any:
 
 def _material() -> type[OpenTable]:
     """Return the table of a material: the parameters of the scenes' materials."""
-    known = {name: (hint, field.default) for name, (hint, field) in OPEN["materials"].items()}
+    known: dict[str, Any] = {n: (hint, f.default) for n, (hint, f) in OPEN["materials"].items()}
     known |= {name: (known[name][0], ...) for name in ("youngs_modulus", "poisson_ratio")}
     known["yield_stress"] = (Stress | None, None)
     known[NAMED] = (Annotated[Any, AfterValidator(_unknown)], None)
-    made: type[OpenTable] = create_model("Material", __base__=OpenTable, **known)  # type: ignore[call-overload]
-    made.__doc__ = "A material; one without a yield stress is elastic."
-    return made
+    words = "A material; one without a yield stress is elastic."
+    return create_model("Material", __base__=OpenTable, __doc__=words, **known)
 
 
 Material = _material()
@@ -243,9 +242,7 @@ def _load(word: str, kind: type[Load]) -> type[LoadTable]:
             known[name] = (Amplitude, ...) if needed else (Amplitude | None, None)
         elif kept is not None and name != "amplitude":
             known[name] = (kept, ... if needed else field.default)
-    made: type[LoadTable] = create_model(f"{kind.__name__}Table", __base__=LoadTable, **known)
-    made.__doc__ = kind.__doc__
-    return made
+    return create_model(f"{kind.__name__}Table", __base__=LoadTable, __doc__=kind.__doc__, **known)
 
 
 def _in_file(hint: Any) -> Any:
@@ -295,8 +292,7 @@ class PairTable(OpenTable):
 def _contact() -> type[PairTable]:
     """Return the table of a contact pair with the parameters of all friction laws."""
     known: dict[str, Any] = {n: (hint, f.default) for n, (hint, f) in OPEN["contacts"].items()}
-    made: type[PairTable] = create_model("ContactTable", __base__=PairTable, **known)
-    return made
+    return create_model("ContactTable", __base__=PairTable, **known)
 
 
 if TYPE_CHECKING:
@@ -508,11 +504,13 @@ def _results() -> type[PlacesTable]:
     known: dict[str, Any] = {"outputs": (tuple[Literal[plain], ...] | None, None)}  # type: ignore[valid-type]
     for word, each in outputs().items():
         if each.parametric:
-            made = create_model(each.make.__name__, __base__=SceneTable, **_fields(each.make))
-            made.__doc__ = each.make.__doc__
-            known[word] = (made | None, None)
-    found: type[PlacesTable] = create_model("ResultsTable", __base__=PlacesTable, **known)
-    return found
+            known[word] = (_table_of(each.make, _fields(each.make)) | None, None)
+    return create_model("ResultsTable", __base__=PlacesTable, **known)
+
+
+def _table_of(kind: Any, entries: Mapping[str, Any]) -> type[SceneTable]:
+    """Return the table of a dataclass with these entries."""
+    return create_model(kind.__name__, __base__=SceneTable, __doc__=kind.__doc__, **entries)
 
 
 def _fields(kind: Any) -> dict[str, Any]:
@@ -534,9 +532,7 @@ def _requested() -> type[SceneTable]:
     words = (*of_body(2), *OF_CONTACT, *OF_PART, *FORCES_OF_CONTACT)
     known = _fields(RequestedNumber) | {"of": (Literal[words], ...)}
     entries = {name: each for name, each in known.items() if name not in ("name", "z")}
-    made = create_model("OutputTable", __base__=SceneTable, **entries)
-    made.__doc__ = RequestedNumber.__doc__
-    return made
+    return _table_of(RequestedNumber, entries)
 
 
 if TYPE_CHECKING:
