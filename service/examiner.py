@@ -79,6 +79,6 @@ def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examin
         return store.scene(store.scene_id(name))
 
     study = Study.known(content, find, store.definition, partial(bounds.check_count, store))
-    bounds.check_size(study)
+    bounds.refuse(runs=study.size)
     cost = estimate(study.checked(), store, bounds)
     return Examined(study, list(study.run_ids()), cost)

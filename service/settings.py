@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -161,13 +162,7 @@ class Settings(BaseSettings):
     @property
     def bounds(self) -> Bounds:
         """Bounds on the cost of a study."""
-        return Bounds(
-            runs=self.max_runs,
-            unknowns=self.max_unknowns,
-            increments=self.max_increments,
-            cpu_seconds=self.max_cpu_seconds,
-            bytes=self.max_bytes,
-        )
+        return Bounds(**{each.name: getattr(self, f"max_{each.name}") for each in fields(Bounds)})
 
     @property
     def outside_access(self) -> dict[str, Any] | None:

@@ -24,7 +24,6 @@ from solver.model.loads import TravellingPressure
 from solver.model.pairs import ContactPair
 from solver.typing import Array
 
-
 FAR = 1.0
 """Equivalent plastic strain beyond which no search for a pass has an answer."""
 

@@ -27,38 +27,26 @@ class Extreme(NamedTuple):
     s: Quantity
 
 
-LARGEST = Extreme(
-    declare("residual_max", "largest residual stress in the body", "MPa", dims=_OVER),
-    declare_along(
-        "residual_max_{}", "position along {} of the largest residual stress in the body", "mm",
-        dims=_OVER,
-    ),
-    declare(
-        "surface_residual_max", "largest residual stress at the contact surface", "MPa",
-        dims=_OVER,
-    ),
-    declare(
-        "surface_residual_max_s",
-        "distance along the surface from its middle of the largest residual stress there", "mm",
-        dims=_OVER,
-    ),
-)  # fmt: skip
-SMALLEST = Extreme(
-    declare("residual_min", "smallest residual stress in the body", "MPa", dims=_OVER),
-    declare_along(
-        "residual_min_{}", "position along {} of the smallest residual stress in the body", "mm",
-        dims=_OVER,
-    ),
-    declare(
-        "surface_residual_min", "smallest residual stress at the contact surface", "MPa",
-        dims=_OVER,
-    ),
-    declare(
-        "surface_residual_min_s",
-        "distance along the surface from its middle of the smallest residual stress there", "mm",
-        dims=_OVER,
-    ),
-)  # fmt: skip
+def _extreme(word: str, which: str) -> Extreme:
+    """Return the quantities of an extreme, such as ``residual_max``, the largest stress."""
+    stress = f"{which} residual stress"
+    return Extreme(
+        declare(f"residual_{word}", f"{stress} in the body", "MPa", dims=_OVER),
+        declare_along(
+            f"residual_{word}_{{}}", f"position along {{}} of the {stress} in the body", "mm",
+            dims=_OVER,
+        ),
+        declare(
+            f"surface_residual_{word}", f"{stress} at the contact surface", "MPa", dims=_OVER
+        ),
+        declare(
+            f"surface_residual_{word}_s",
+            f"distance along the surface from its middle of the {stress} there", "mm", dims=_OVER,
+        ),
+    )  # fmt: skip
+
+
+LARGEST, SMALLEST = _extreme("max", "largest"), _extreme("min", "smallest")
 
 
 @output("residual_extremes", "surfaces", "release")

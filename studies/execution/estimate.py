@@ -12,7 +12,7 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -137,61 +137,39 @@ class Bounds:
     bytes: int | None = None
 
     def check_count(self, store: Store, runs: int, scene: Scene, keep: Any) -> None:
-        """Refuse a number of runs, before one of them is made.
+        """Refuse a number of runs, before one of them is made; as `refuse`.
 
         What the runs that `store` can lack will store is at least that of the scene's usual files.
-
-        Raises
-        ------
-        StudyError
-            naming the bound, and the setting that holds it
         """
-        self._refuse("runs", runs)
+        self.refuse(runs=runs)
         there = store.catalogue.counts()
         lacking = runs - sum(there.get(status, 0) for status in SOLVED)
         if lacking > 0:
-            self._refuse("bytes", lacking * _file_size(scene.name, keep, store) * _COMBINED)
-
-    def check_size(self, study: Study) -> None:
-        """Refuse a study of too many runs, before each run is checked.
-
-        Raises
-        ------
-        StudyError
-            naming the bound, and the setting that holds it
-        """
-        self._refuse("runs", study.size)
+            self.refuse(bytes=lacking * _file_size(scene.name, keep, store) * _COMBINED)
 
     def check(self, estimate: Estimate) -> None:
-        """Refuse a study whose estimate exceeds a bound; None in the estimate is accepted.
+        """Refuse a study whose estimate exceeds a bound; as `refuse`."""
+        self.refuse(
+            runs=estimate.runs,
+            unknowns=estimate.unknowns,
+            increments=estimate.longest,
+            cpu_seconds=estimate.cpu_seconds[1] if estimate.cpu_seconds else None,
+            bytes=estimate.bytes,
+        )
+
+    def refuse(self, **requested: float | None) -> None:
+        """Refuse what exceeds a bound; None is accepted.
 
         Raises
         ------
         StudyError
             naming the bound, and the setting that holds it
         """
-        likely = estimate.cpu_seconds[1] if estimate.cpu_seconds else None
-        requested = {
-            "runs": estimate.runs,
-            "unknowns": estimate.unknowns,
-            "increments": estimate.longest,
-            "cpu_seconds": likely,
-            "bytes": estimate.bytes,
-        }
-        for bound in fields(self):
-            self._refuse(bound.name, requested[bound.name])
-
-    def check_so_far(self, unknowns: int, increments: int, cpu_seconds: float) -> None:
-        """Refuse a study by a part of its runs; as `check`."""
-        self._refuse("unknowns", unknowns)
-        self._refuse("increments", increments)
-        self._refuse("cpu_seconds", cpu_seconds)
-
-    def _refuse(self, name: str, requested: float | None) -> None:
-        most = getattr(self, name)
-        if most is not None and requested is not None and requested > most:
-            allowed = f"at most {most:g}: {_MEANING[name]} (setting max_{name})"
-            raise StudyError(f"estimate.{name}", round(requested), allowed)
+        for name, value in requested.items():
+            most = getattr(self, name)
+            if most is not None and value is not None and value > most:
+                allowed = f"at most {most:g}: {_MEANING[name]} (setting max_{name})"
+                raise StudyError(f"estimate.{name}", round(value), allowed)
 
 
 _MEANING = {
@@ -250,7 +228,7 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
             cost = 1.0 if scene.derivatives is None else scene.derivatives.cost
             seconds = [each + cost * one for each, one in zip(seconds, more, strict=True)]
             if bounds:
-                bounds.check_so_far(unknowns, longest, share * seconds[1])
+                bounds.refuse(unknowns=unknowns, increments=longest, cpu_seconds=share * seconds[1])
         results += len(missing) * _of(_PER_RUN, elements)
         set_up += _of(_PER_SETUP, elements)
         if scene.setup is None:

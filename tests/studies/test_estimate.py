@@ -281,7 +281,7 @@ def test_millions_of_elements_and_ten_thousands_of_increments_are_refused(store:
 def test_too_many_runs_are_refused_before_they_are_gone_through() -> None:
     study = Study.known(many(80_000))
     with counted() as calls, pytest.raises(StudyError, match=r"estimate\.runs = 80000: at most"):
-        Bounds(runs=20_000).check_size(study)
+        Bounds(runs=20_000).refuse(runs=study.size)
     assert calls < 300_000
 
 

@@ -522,7 +522,7 @@ def test_the_estimate_is_the_most_that_the_search_may_take(store: Store, scene: 
     assert found.paths == 4 * asked.kind.most[0]
     assert len(search_here(asked, store)) <= found.runs
     with pytest.raises(StudyError, match="at most 10: use fewer values"):
-        Bounds(runs=10).check_size(asked)
+        Bounds(runs=10).refuse(runs=asked.size)
 
 
 @pytest.mark.parametrize(

@@ -396,7 +396,7 @@ def test_the_estimate_is_the_most_that_it_may_take(store: Store) -> None:
     found = estimate(study({"most": 50}), store)
     assert found.runs == found.to_compute == 50
     with pytest.raises(StudyError, match="at most 10: use fewer values"):
-        Bounds(runs=10).check_size(study())
+        Bounds(runs=10).refuse(runs=study().size)
 
 
 @pytest.mark.parametrize(

@@ -29,23 +29,19 @@ _PATCH = ("x", "z")
 PATCH_PRESSURE = declare(
     "patch_pressure", "contact pressure on the running surface", "MPa", dims=_PATCH
 )
+_WAYS = (("x", "along x"), ("z", "across it"))
 PATCH_SHEAR = {
-    "x": declare(
-        "patch_shear_x", "contact shear on the running surface along x", "MPa", dims=_PATCH
-    ),
-    "z": declare(
-        "patch_shear_z", "contact shear on the running surface across it", "MPa", dims=_PATCH
-    ),
+    axis: declare(
+        f"patch_shear_{axis}", f"contact shear on the running surface {way}", "MPa", dims=_PATCH
+    )
+    for axis, way in _WAYS
 }
 PATCH_SLIP = {
-    "x": declare(
-        "patch_slip_x", "slip of the running surface over the wheel along x, per advance",
-        dims=_PATCH,
-    ),
-    "z": declare(
-        "patch_slip_z", "slip of the running surface over the wheel across it, per advance",
-        dims=_PATCH,
-    ),
+    axis: declare(
+        f"patch_slip_{axis}",
+        f"slip of the running surface over the wheel {way}, per advance", dims=_PATCH,
+    )
+    for axis, way in _WAYS
 }  # fmt: skip
 PATCH_STATUS = declare(
     "patch_status", "whether the surfaces are open, stick or slip", dims=_PATCH, flags=PatchStatus
