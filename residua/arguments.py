@@ -15,6 +15,9 @@ from studies.errors import StudyError
 from studies.execution.executor import Limits
 from studies.storage.blobs import directory_of, is_address
 
+Add = Callable[..., argparse.ArgumentParser]
+"""Adds a subcommand, and returns its parser."""
+
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser; `command` of its options is the function that carries them out."""
@@ -40,13 +43,9 @@ def parser() -> argparse.ArgumentParser:
     one = add("scenes", commands.scenes)
     one.add_argument("name", nargs="?")
 
-    one = add("show", commands.show)
-    one.add_argument("path", type=_store, metavar="DIR|RUN")
-    _study(one)
+    _of_study(add, "show", commands.show, _store, "DIR|RUN")
 
-    one = add("export", commands.export)
-    one.add_argument("path", type=_store, metavar="RUN|DIR")
-    _study(one)
+    one = _of_study(add, "export", commands.export, _store, "RUN|DIR")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument(
         "--vtu", type=_path, metavar="FOLDER", help="fields at the nodes, for ParaView"
@@ -66,17 +65,13 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--data", type=_store, metavar="DIR", help="default: out")
     one.add_argument("--scheduler", metavar="ADDRESS", help="use a running dask scheduler")
 
-    one = add("view", commands.view)
-    one.add_argument("path", type=_store, metavar="DIR|DATASET")
-    _study(one)
+    one = _of_study(add, "view", commands.view, _store, "DIR|DATASET")
     one.add_argument(
         "--port", type=_integer(0, 65535), default=0, help="default: any port that is free"
     )
     one.add_argument("--no-browser", action="store_true", help="print the address alone")
 
-    one = add("report", commands.report)
-    one.add_argument("path", type=_place, metavar="DIR|DATASET")
-    _study(one)
+    one = _of_study(add, "report", commands.report, _place, "DIR|DATASET")
     one.add_argument(
         "--out", "-o", type=_path, default=Path("report.html"), metavar="HTML",
         help="default: %(default)s",
@@ -94,10 +89,16 @@ class _Parser(argparse.ArgumentParser):
         sys.exit(complain(f"{message} (--help lists what is allowed)", BAD_INPUT))
 
 
-def _study(one: argparse.ArgumentParser) -> None:
+def _of_study(
+    add: Add, name: str, command: Any, kind: Callable[[str], Any], metavar: str
+) -> argparse.ArgumentParser:
+    """Return the parser of a command on a study, or a run, that is there."""
+    one = add(name, command)
+    one.add_argument("path", type=kind, metavar=metavar)
     one.add_argument(
         "--study", metavar="NAME|ID|latest", help="of the studies in a folder, as DIR/NAME says too"
     )
+    return one
 
 
 def _results(one: argparse.ArgumentParser) -> None:
@@ -108,7 +109,7 @@ def _results(one: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def _add_pictures(add: Callable[..., argparse.ArgumentParser]) -> None:
+def _add_pictures(add: Add) -> None:
     one = add("draw", commands.draw)
     one.add_argument(
         "what", metavar="SCENE|STUDY.toml",
@@ -121,9 +122,7 @@ def _add_pictures(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--zoom", type=float, metavar="MM", help="only within this distance of 0, 0")
     _add_window(one)
 
-    one = add("plot", commands.plot)
-    one.add_argument("path", type=_place, metavar="RUN|DIR")
-    _study(one)
+    one = _of_study(add, "plot", commands.plot, _place, "RUN|DIR")
     one.add_argument(
         "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
         help="of the sweep, or of the field's own dimensions, such as pass=2",
@@ -195,7 +194,7 @@ def _add_run(one: argparse.ArgumentParser) -> None:
     one.add_argument("--dry-run", action="store_true", help="print the estimated cost, and end")
 
 
-def _add_cluster(add: Callable[..., argparse.ArgumentParser]) -> None:
+def _add_cluster(add: Add) -> None:
     one = add("slurm", commands.slurm)
     one.add_argument("study", type=_path, metavar="STUDY.toml")
     _results(one)
@@ -209,7 +208,7 @@ def _add_cluster(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--script", type=_path, required=True, metavar="FILE", help="what is written")
 
 
-def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
+def _add_numbers(add: Add) -> None:
     one = add("diff", commands.diff)
     one.add_argument("first", type=_place, metavar="A", help="a study: a folder, a file or a URL")
     one.add_argument("second", type=_place, metavar="B", help="a study that may differ from it")
@@ -220,9 +219,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--field", help="the number of the runs that is drawn")
     one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
 
-    one = add("table", commands.table)
-    one.add_argument("path", type=_place, metavar="DIR")
-    _study(one)
+    one = _of_study(add, "table", commands.table, _place, "DIR")
     kind = one.add_mutually_exclusive_group()
     kind.add_argument("--csv", action="store_true", help="with commas between; this is the default")
     kind.add_argument("--json", action="store_true", help="columns with units, rows as objects")
@@ -233,17 +230,13 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
     )
     one.add_argument("--out", type=_path, metavar="FILE", help="default: print it")
 
-    one = add("best", commands.best)
-    one.add_argument("path", type=_place, metavar="DIR")
-    _study(one)
+    one = _of_study(add, "best", commands.best, _place, "DIR")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     _add_where(one)
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
-    one = add("predict", commands.predict)
-    one.add_argument("path", type=_store, metavar="DIR")
-    _study(one)
+    one = _of_study(add, "predict", commands.predict, _store, "DIR")
     one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
@@ -252,9 +245,7 @@ def _add_numbers(add: Callable[..., argparse.ArgumentParser]) -> None:
         "--compute", action="store_true", help="compute the run there if the error is larger"
     )
 
-    one = add("sensitivity", commands.sensitivity)
-    one.add_argument("path", type=_store, metavar="DIR")
-    _study(one)
+    one = _of_study(add, "sensitivity", commands.sensitivity, _store, "DIR")
     one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
     one.add_argument(
@@ -271,7 +262,7 @@ def _add_where(one: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
+def _add_access(add: Add) -> None:
     actions = add("keys", keys.keys).add_subparsers(required=True, metavar="ACTION")
     for act in (keys.add, keys.list_, keys.remove):
         name = act.__name__.strip("_")
@@ -287,7 +278,7 @@ def _add_access(add: Callable[..., argparse.ArgumentParser]) -> None:
     one.add_argument("--out", type=_path, required=True, metavar="DIR")
 
 
-def _add_remote(add: Callable[..., argparse.ArgumentParser]) -> None:
+def _add_remote(add: Add) -> None:
     for talk in (commands.submit, commands.status, commands.cancel, commands.fetch):
         name = talk.__name__
         one = add(name, commands.remote, talk=talk)

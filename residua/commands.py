@@ -177,7 +177,6 @@ def draw(options: argparse.Namespace) -> int:
         print(f"warning: {doubt}", file=sys.stderr)
     sheet = setup_figure(scene, values, options.zoom, options.window)
     _save(resolved(sheet, options.resolution), options.out)
-    print(f"wrote {options.out}")
     return OK
 
 
@@ -217,7 +216,6 @@ def plot(options: argparse.Namespace) -> int:
             resolution=options.resolution,
         )  # fmt: skip
         _save(drawn, options.out)
-    print(f"wrote {options.out}")
     return OK
 
 
@@ -272,7 +270,6 @@ def diff(options: argparse.Namespace) -> int:
         from studies.views.plots.differing import difference_figure
 
         _save(difference_figure(found, options.field), options.out)
-        print(f"wrote {options.out}")
     return OK
 
 
@@ -317,7 +314,6 @@ def sensitivity(options: argparse.Namespace) -> int:
             from studies.views.plots.sensitivity import sensitivity_figure
 
             _save(sensitivity_figure(dataset, found, selection), options.out)
-            print(f"wrote {options.out}")
     return OK
 
 
@@ -463,7 +459,7 @@ def _interruption(*others: signal.Signals) -> Iterator[list[int]]:
 
 
 def _save(drawn: Any, path: Path) -> None:
-    """Write a figure in the format given by the ending of the file name."""
+    """Write a figure in the format given by the ending of the file name, and say so."""
     from studies.views.plots.sheets import save
 
     kinds = drawn.canvas.get_supported_filetypes()
@@ -472,6 +468,7 @@ def _save(drawn: Any, path: Path) -> None:
         raise StudyError("--out", str(path), f"must end in one of {', '.join(sorted(kinds))}")
     with _written("--out", path) as part:
         save(drawn, part, kind)
+    print(f"wrote {path}")
 
 
 @contextmanager
