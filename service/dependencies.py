@@ -16,7 +16,7 @@ from service.inspector import Inspector
 from service.job import Job
 from service.jobs import Jobs
 from service.keys import Keys, Scope
-from service.maps import Pictures
+from service.maps import Drawing, Pictures
 from service.metrics import Metrics
 from service.overview import Details
 from service.probe import Probe
@@ -52,7 +52,6 @@ TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]
 TheKeys = Annotated[Keys, held("keys")]
 TheMetrics = Annotated[Metrics, held("metrics")]
-ThePictures = Annotated[Pictures, held("pictures")]
 TheProbe = Annotated[Probe, held("probe")]
 TheRunner = Annotated[Runner, held("runner")]
 TheSettings = Annotated[Settings, held("settings")]
@@ -83,6 +82,19 @@ def share(name: str) -> Any:
 TheReading = Annotated[Share, share("reading")]
 TheComputing = Annotated[Share, share("computing")]
 TheCombining = Annotated[Share, share("combining")]
+
+
+async def get_drawing(
+    pictures: Annotated[Pictures, held("pictures")],
+    request: Request,
+    reading: TheReading,
+    computing: TheComputing,
+) -> Drawing:
+    """Return what draws the pictures of a request."""
+    return Drawing(pictures, request, reading, computing)
+
+
+TheDrawing = Annotated[Drawing, Depends(get_drawing)]
 
 
 def in_turn(function: Callable[..., Found]) -> Callable[..., Coroutine[Any, Any, Found]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -45,14 +46,18 @@ class Pictures:
             drawn: bytes = await turn.apart(draw, *given, field="picture", name=name)
             return self.kept.put(tag, drawn)
 
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """The pictures that a request asks for, in the turns of its caller."""
+
+    pictures: Pictures
+    request: Request
+    reading: Share
+    computing: Share
+
     async def answer(
-        self,
-        request: Request,
-        what: object,
-        share: Share,
-        draw: Callable[..., bytes],
-        *given: object,
-        name: object,
+        self, what: object, draw: Callable[..., bytes], *given: object, name: object
     ) -> Response:
         """Return the answer with the picture of ``what``, unless the caller has it.
 
@@ -61,20 +66,14 @@ class Pictures:
         what : all that the picture depends on, but the version
         """
         headers = tagged((solver.__version__, what))
-        if known := unchanged(request, headers):
+        if known := unchanged(self.request, headers):
             return known
-        picture = await self.get(headers["etag"], share, draw, *given, name=name)
+        picture = await self.pictures.get(headers["etag"], self.computing, draw, *given, name=name)
         return Response(picture, media_type=PNG, headers=dict(headers))
 
     async def of_file(
-        self,
-        request: Request,
-        path: Path,
-        query: Drawn,
-        reading: Share,
-        computing: Share,
-        draw: Callable[[Path, Drawn], bytes],
+        self, path: Path, query: Drawn, draw: Callable[[Path, Drawn], bytes]
     ) -> Response:
         """Return the answer with a picture of the file of a run or a study."""
-        what = path.name, await reading.here(digest, path), query
-        return await self.answer(request, what, computing, draw, path, query, name=path.stem)
+        what = path.name, await self.reading.here(digest, path), query
+        return await self.answer(what, draw, path, query, name=path.stem)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from http import HTTPStatus
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 from starlette.convertors import StringConvertor, register_url_convertor
 
 from service.dependencies import (
     TheComputing,
+    TheDrawing,
     TheKeeper,
-    ThePictures,
-    TheReading,
     TheRun,
     TheStore,
     in_turn,
@@ -87,32 +86,18 @@ def delete_run(run: TheRun, keeper: TheKeeper) -> None:
 
 @router.get("/{run_id}/map.png", responses={**PICTURE, **REFUSED})
 async def draw_map(
-    run: TheRun,
-    query: Annotated[MapQuery, Query()],
-    store: TheStore,
-    pictures: ThePictures,
-    reading: TheReading,
-    computing: TheComputing,
-    request: Request,
+    run: TheRun, query: Annotated[MapQuery, Query()], store: TheStore, drawing: TheDrawing
 ) -> Response:
     """Draw a field of a run around the contact."""
-    path = store.run_path(run["id"])
-    return await pictures.of_file(request, path, query, reading, computing, MAP)
+    return await drawing.of_file(store.run_path(run["id"]), query, MAP)
 
 
 @router.get("/{run_id}/line.png", responses={**PICTURE, **REFUSED})
 async def draw_lines(
-    run: TheRun,
-    query: Annotated[LineQuery, Query()],
-    store: TheStore,
-    pictures: ThePictures,
-    reading: TheReading,
-    computing: TheComputing,
-    request: Request,
+    run: TheRun, query: Annotated[LineQuery, Query()], store: TheStore, drawing: TheDrawing
 ) -> Response:
     """Draw a field of a run along lines, contacts, depths or increments.
 
     Beside the queries named below, every dimension of the field is one: `?stage=loaded&pass=2`.
     """
-    path = store.run_path(run["id"])
-    return await pictures.of_file(request, path, query, reading, computing, LINES)
+    return await drawing.of_file(store.run_path(run["id"]), query, LINES)

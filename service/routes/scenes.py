@@ -10,10 +10,9 @@ from fastapi import APIRouter, File, Query, Request, Response, UploadFile
 
 from service.dependencies import (
     TheComputing,
+    TheDrawing,
     TheInspector,
     TheKeeper,
-    ThePictures,
-    TheReading,
     TheStore,
     in_turn,
 )
@@ -104,23 +103,16 @@ def get_scene(name: str, store: TheStore) -> dict[str, Any]:
 
 @router.get("/{name}/draw.png", responses={**PICTURE, **REFUSED})
 async def draw_scene(
-    name: str,
-    query: Annotated[SketchQuery, Query()],
-    store: TheStore,
-    pictures: ThePictures,
-    reading: TheReading,
-    computing: TheComputing,
-    request: Request,
+    name: str, query: Annotated[SketchQuery, Query()], store: TheStore, drawing: TheDrawing
 ) -> Response:
     """Draw a scene before anything is computed: meshes, boundaries, supports, loads, contacts.
 
     Beside the queries named below, every parameter of the scene is one: `?friction=0.3`. `name` is
     that of a scene, or the id of a posted one.
     """
-    known = await reading.here(store.scene_id, name)
-    await reading.here(known_scene, store, known)
-    what, given = (known, query), (store.directory, known, query)
-    return await pictures.answer(request, what, computing, DRAWN, *given, name=known)
+    known = await drawing.reading.here(store.scene_id, name)
+    await drawing.reading.here(known_scene, store, known)
+    return await drawing.answer((known, query), DRAWN, store.directory, known, query, name=known)
 
 
 @router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT)

@@ -21,11 +21,11 @@ from service.dependencies import (
     TheComputing,
     TheDatasets,
     TheDetails,
+    TheDrawing,
     TheExaminer,
     TheJob,
     TheJobs,
     TheKeeper,
-    ThePictures,
     TheReading,
     TheRunner,
     TheSettings,
@@ -251,18 +251,15 @@ async def draw_study(
     job: TheJob,
     query: Annotated[PlotQuery, Query()],
     datasets: TheDatasets,
-    pictures: ThePictures,
-    reading: TheReading,
-    computing: TheComputing,
-    request: Request,
+    drawing: TheDrawing,
 ) -> Response:
     """Draw a number of the runs over what is swept, or a map or lines of one run.
 
     Beside the queries named below, every axis of the sweep and dimension of the field is one:
     `?field=contact_pressure&over=friction&load_ratio=0.5&stage=loaded`.
     """
-    found = await reading.here(datasets.ended, job)
-    return await pictures.of_file(request, found, query, reading, computing, DRAWN)
+    found = await drawing.reading.here(datasets.ended, job)
+    return await drawing.of_file(found, query, DRAWN)
 
 
 @router.get("/{study_id}/fit", responses=REFUSED)
