@@ -26,13 +26,12 @@ from service.inspector import Inspector
 from service.jobs import Jobs
 from service.keys import Keys, KeysError
 from service.maps import Pictures
-from service.metrics import Metrics
+from service.metrics import Metrics, Probe
 from service.middleware import SecurityHeaders, body_limit, head_is_get
 from service.overview import Details
 from service.pages import new
 from service.pages import routes as pages
 from service.pool import Pool
-from service.probe import Probe
 from service.processes import Starter, find_modules_at_home, share_arenas
 from service.recovery import Mender, open_queue
 from service.retention import Keeper

@@ -17,9 +17,8 @@ from service.job import Job
 from service.jobs import Jobs
 from service.keys import Keys, Scope
 from service.maps import Drawing, Pictures
-from service.metrics import Metrics
+from service.metrics import Metrics, Probe
 from service.overview import Details
-from service.probe import Probe
 from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId

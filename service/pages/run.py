@@ -14,7 +14,7 @@ from studies.definition.parameters import parameters_of
 from studies.numbers import rounding
 from studies.storage.dataset import attributes_of
 from studies.views.columns import COMPUTED, computed_text, unit_text
-from studies.views.figures import group_of, meter
+from studies.views.rules import group_of, meter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,8 +10,8 @@ import numpy as np
 
 from studies.definition.vocabulary import OK
 from studies.numbers import rounding
-from studies.views.figures import FIGURES, group_of
 from studies.views.html import number
+from studies.views.rules import FIGURES, group_of
 from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, varied
 
 ROWS = 25

@@ -36,9 +36,9 @@ from studies.views.columns import (
     value_text,
 )
 from studies.views.elasticities import derived, elasticities
-from studies.views.figures import FIGURES, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.reading import open_study
+from studies.views.rules import FIGURES, worst
 from studies.views.summary import NAMED, Failed, Summary, placed, values_text
 
 LISTED = 100

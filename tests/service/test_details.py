@@ -22,7 +22,7 @@ from service.pages.study import cell_text, floors_of
 from service.schemas import StudyDetail, Window
 from service.turns import Share, Turns
 from studies import Store
-from studies.views.figures import group_of
+from studies.views.rules import group_of
 from studies.views.table import RunTable, column_of
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}

@@ -25,7 +25,7 @@ import psutil
 import pytest
 from fastapi import FastAPI
 
-from service import probe
+from service import metrics
 from service.app import create_app
 from service.connections import limited
 from service.errors import Busy, NoRoom, status_of
@@ -267,10 +267,10 @@ def test_health_needs_no_thread_that_others_use(app: FastAPI) -> None:
 
 def test_a_directory_that_hangs_is_told(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
     hanging = threading.Event()
-    monkeypatch.setattr(probe, "SECONDS", 0.2)
+    monkeypatch.setattr(metrics, "SECONDS", 0.2)
     asked: list[Any] = []
     monkeypatch.setattr(
-        probe, "look", lambda *given: (asked.append(given), (hanging.wait(20.0), {}))[1]
+        metrics, "look", lambda *given: (asked.append(given), (hanging.wait(20.0), {}))[1]
     )
 
     async def twice() -> list[bool]:
@@ -310,10 +310,10 @@ def test_a_directory_that_cannot_be_written_in_is_told_without_its_path(
 
 def test_a_full_disk_is_not_writable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store, jobs = Store(tmp_path), Jobs(tmp_path / "jobs.sqlite")
-    assert probe.look(store, jobs)["data_writable"]
+    assert metrics.look(store, jobs)["data_writable"]
     full = Path("/dev/full")
-    monkeypatch.setattr(probe.tempfile, "TemporaryFile", lambda dir: full.open("r+b"))
-    assert "data_writable" not in probe.look(store, jobs)
+    monkeypatch.setattr(metrics.tempfile, "TemporaryFile", lambda dir: full.open("r+b"))
+    assert "data_writable" not in metrics.look(store, jobs)
 
 
 def test_a_study_larger_than_the_free_disk_or_the_default_limits_is_refused(

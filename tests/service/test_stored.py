@@ -29,7 +29,7 @@ from service.inspector import Inspector
 from service.job import StudyState
 from service.jobs import Jobs
 from service.keys import Keys, KeysError, Scope
-from service.probe import look
+from service.metrics import look
 from service.recovery import Mender, open_queue
 from service.retention import Keeper
 from service.settings import Settings
