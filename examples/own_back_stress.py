@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.materials import BackStress, Elasticity
-from solver.materials.words import HARDENING, MovingRule
+from solver.materials.hardening_rules import HARDENING, MovingRule
 from solver.parameters import Stress, described
 from solver.tensors import von_mises
 

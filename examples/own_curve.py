@@ -6,7 +6,7 @@ import numpy as np
 
 from solver import Body, Displacement, Model, solve
 from solver.materials import Chaboche, Elasticity
-from solver.materials.words import HARDENING, GrowingRule
+from solver.materials.hardening_rules import HARDENING, GrowingRule
 from solver.mesh import grid
 from solver.parameters import described
 

@@ -17,7 +17,7 @@ from solver import SCENES, Body, Model, Program, Scene, Status
 from solver.loading.program import load_and_release
 from solver.mesh import grid
 from solver.parameters import Length, Ratio, described
-from solver.results.extremes import cost, extremes
+from solver.results.figures import cost, extremes
 from solver.results.maps import maps, profiles
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values

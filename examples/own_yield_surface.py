@@ -11,7 +11,8 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.materials import Elasticity
-from solver.materials.words import YIELD_CONDITIONS, NoHardening, SmoothCondition
+from solver.materials.hardening_rules import NoHardening
+from solver.materials.yield_conditions import YIELD_CONDITIONS, SmoothCondition
 from solver.parameters import described
 
 

@@ -39,7 +39,7 @@ _OUTPUTS: dict[str, NamedOutput] = {}
 MODULES = tuple(
     f"solver.results.{module}"
     for module in (
-        "contact", "cracks", "extremes", "fatigue", "increments", "indentation", "maps", "places",
+        "contact", "cracks", "fatigue", "figures", "increments", "indentation", "maps", "places",
         "singularity", "wear",
     )
 )  # fmt: skip

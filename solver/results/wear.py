@@ -10,7 +10,7 @@ from annotated_types import Interval, MinLen, Unit
 
 from solver.fatigue.wear import archard_depth, slip_work
 from solver.parameters import Checked, described
-from solver.results.contact_result import contact_result
+from solver.results.acting import contact_result
 from solver.results.outputs import output
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values

@@ -9,8 +9,9 @@ from typing import Any, ClassVar, Literal
 from solver.errors import ModelError
 from solver.materials.elastic_plastic import Material
 from solver.materials.elasticity import Elasticity
+from solver.materials.hardening_rules import HARDENING
 from solver.materials.law import Law
-from solver.materials.words import HARDENING, YIELD_CONDITIONS
+from solver.materials.yield_conditions import YIELD_CONDITIONS
 from solver.model.friction import FRICTION, FrictionLaw
 from solver.model.pairs import ContactPair
 from solver.parameters import Accuracy, Poisson, Stress, check, described

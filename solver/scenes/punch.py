@@ -155,10 +155,10 @@ PUNCH = Scene(
     outputs=(
         *late("results.maps", "maps", "profiles", "surfaces"),
         *late("results.contact", "contact"),
-        *late("results.extremes", "extremes", "residual_extremes"),
+        *late("results.figures", "extremes", "residual_extremes"),
         *late("scenes.punch_setup", "figures"),
     ),
-    costs=late("results.extremes", "cost"),
+    costs=late("results.figures", "cost"),
     increment_error=0.04,  # the error of the mesh is larger
     effort=_effort,
     advice={

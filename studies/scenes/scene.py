@@ -16,8 +16,8 @@ from solver.errors import ModelError
 from solver.loading.program import Program, walked
 from solver.model.model import Model
 from solver.parameters import Accuracy, by_accuracy, check, described
-from solver.results.extremes import cost
 from solver.results.fields import Samples
+from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
 from solver.results.record import Status

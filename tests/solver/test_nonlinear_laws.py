@@ -31,7 +31,7 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
-from solver.materials.words import HARDENING
+from solver.materials.hardening_rules import HARDENING
 from solver.materials.yield_surface import Tresca, VonMises
 from solver.mesh import grid
 from solver.tensors import identity

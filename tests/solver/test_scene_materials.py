@@ -20,7 +20,7 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
-from solver.materials.words import HARDENING
+from solver.materials.hardening_rules import HARDENING
 from solver.scenes.punch import PunchParameters
 from tests.architecture.sources import ROOT
 

@@ -17,8 +17,8 @@ from solver import Material, ModelError
 from solver.contact.state import BodyState
 from solver.materials.state import PlasticState
 from solver.results.acting import Acting
-from solver.results.extremes import residual_extremes
 from solver.results.fields import Samples, SystemFields
+from solver.results.figures import residual_extremes
 from solver.results.maps import isochromatics, maps, profiles, surfaces
 from solver.results.mesh_fields import to_meshio
 from solver.results.named_places import NamedPlaces, at_named_places

@@ -24,8 +24,8 @@ import solver.fem.discretisation
 import solver.fem.fields
 import solver.loading.walker
 import solver.results.acting
-import solver.results.extremes
 import solver.results.fields
+import solver.results.figures
 import solver.results.increments
 import solver.results.places
 import solver.results.shakedown
@@ -593,10 +593,10 @@ MUTATIONS: dict[str, Mutation] = {
     "another component sought": _file(other_component, STORED),
     "place of an extreme turned": _file(instead(RequestedNumber, "_found", place_turned), STORED),
     "largest in size for largest": _pressed(
-        instead(solver.results.extremes, "_most", largest_of_all), STORED
+        instead(solver.results.figures, "_most", largest_of_all), STORED
     ),
     "extreme of another node": _pressed(
-        instead(solver.results.extremes, "_most", wrong_place), STORED
+        instead(solver.results.figures, "_most", wrong_place), STORED
     ),
 }
 

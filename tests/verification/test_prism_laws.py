@@ -10,8 +10,8 @@ import pytest
 
 from solver.linear.solvers import one_thread
 from solver.materials import SmoothMaterial, Voce
+from solver.materials.hardening_rules import HARDENING
 from solver.materials.law import Law
-from solver.materials.words import HARDENING
 from solver.results.shakedown import ShakedownState, classify
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism

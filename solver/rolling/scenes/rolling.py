@@ -337,13 +337,13 @@ ROLLING = Scene(
     view=_view,
     outputs=(
         *late("results.maps", "maps", "surfaces"),
-        *late("results.extremes", "residual_extremes"),
+        *late("results.figures", "residual_extremes"),
         *late("rolling.scenes.rolling_setup", "profile_figures", "surface"),
         *late("results.contact", "contact"),
-        *late("results.extremes", "extremes"),
+        *late("results.figures", "extremes"),
         *late("rolling.scenes.rolling_setup", "wheel", "cycles"),
     ),
-    costs=(*late("results.extremes", "cost"), *late("rolling.scenes.rolling_setup", "progress")),
+    costs=(*late("results.figures", "cost"), *late("rolling.scenes.rolling_setup", "progress")),
     trace=_trace,
     refinement=_refinement,
     increment_error=math.inf,  # increments are those of `advance_step`, see `refinement`

@@ -159,13 +159,12 @@ def rail_scene(
         sketch=sketch,
         outputs=(
             *late("results.maps", "maps", "profiles"),
-            *late("results.extremes", "residual_extremes"),
-            *late("results.extremes", "extremes"),
+            *late("results.figures", "residual_extremes", "extremes"),
             *late("rolling.scenes.rail_outputs", "patch", "section"),
             *outputs,
         ),
         costs=(
-            *late("results.extremes", "cost"),
+            *late("results.figures", "cost"),
             *late("rolling.scenes.rail_outputs", "accuracy"),
         ),
         warnings=late("rolling.scenes.rail_outputs", "undecided")[0],
