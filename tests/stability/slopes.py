@@ -20,7 +20,7 @@ import numpy as np
 
 from solver.derivatives.asked import Derivatives, named, reach
 from solver.errors import ModelError
-from solver.loading.control import Control, Tolerances
+from solver.loading.program import Control, Tolerances
 from solver.scenes import Scene
 from solver.shipped import SCENES
 from studies.scenes.registry import scene_named
