@@ -32,10 +32,11 @@ from solver.results import saved
 from solver.results.acting import ContactResult, contact_result
 from solver.results.body_fields import BodyValues
 from solver.results.cracks import StressIntensity, stress_intensities
+from solver.results.cycles import decided, shakedown_of
 from solver.results.fields import SystemFields
 from solver.results.increments import Observed, observe
 from solver.results.mesh_fields import MeshFields, write_vtu
-from solver.results.shakedown import Shakedown, decided, shakedown_of
+from solver.results.shakedown import Shakedown
 from solver.results.view import Places
 from solver.tensors import to_tensor
 from solver.typing import Array

@@ -18,12 +18,12 @@ from solver.loading.outcome import Outcome
 from solver.loading.program import Control, Program, walked
 from solver.loading.walker import Walker
 from solver.results.acting import acting_on
+from solver.results.cycles import decided
 from solver.results.fields import Samples
 from solver.results.maps import outlines
 from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
 from solver.results.run import FinishedRun, Output, Values
-from solver.results.shakedown import decided
 from solver.results.singularity import singular_points
 from solver.scenes.scene import Monitor, Scene
 

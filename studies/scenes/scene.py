@@ -16,13 +16,13 @@ from solver.errors import ModelError
 from solver.loading.program import Program, walked
 from solver.model.model import Model
 from solver.parameters import Accuracy, by_accuracy, check, described
+from solver.results.cycles import LEAST, over_cycles
 from solver.results.fields import Samples
 from solver.results.figures import cost
 from solver.results.named_places import NamedPlaces, at_named_places
 from solver.results.outputs import outputs
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Output, Values
-from solver.results.shakedown import LEAST, over_cycles
 from solver.results.view import View
 from solver.scenes.material_parameters import ContactParameters
 from solver.scenes.scene import Effort

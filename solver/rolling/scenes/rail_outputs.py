@@ -13,10 +13,11 @@ import scipy
 from solver.errors import NoContact, Runaway, WindowTooSmall
 from solver.materials.law import Law
 from solver.model.friction import PatchStatus
+from solver.results.cycles import shakedown
 from solver.results.quantities import declare
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
-from solver.results.shakedown import ShakedownState, shakedown
+from solver.results.shakedown import ShakedownState
 from solver.rolling.rail.section import Section
 from solver.rolling.scenes.passes import mean_added, passes, shakedown_of
 from solver.rolling.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE

@@ -11,10 +11,11 @@ import numpy as np
 from solver.errors import Runaway, WindowTooSmall
 from solver.loading.program import Program, StepRefinement
 from solver.mesh.lines import cells
+from solver.results.cycles import shakedown
 from solver.results.quantities import Quantity, declare
 from solver.results.record import Status
 from solver.results.run import FinishedRun, Values
-from solver.results.shakedown import Shakedown, ShakedownState, shakedown
+from solver.results.shakedown import Shakedown, ShakedownState
 from solver.results.view import View
 from solver.rolling.plane.lines import recorded_step
 from solver.rolling.results.free_surface import FreeSurface
