@@ -301,8 +301,10 @@ def unmet_needs(scene: tables.SceneFile) -> Iterator[StudyError]:
         "release": (bool(scene.released), "a last stage that releases the bodies"),
     }
     for word in taken.words:
-        for stage in getattr(getattr(taken, word, None), "cycle", ()):
-            yield from _one_of(f"results.{word}.cycle", stage, scene.stage_names)
+        given = getattr(taken, word, None)
+        for entry in ("since", "until"):
+            if stage := getattr(given, entry, ""):
+                yield from _one_of(f"results.{word}.{entry}", stage, scene.stage_names)
         missing = [words for need in outputs()[word].needs for is_there, words in [there[need]]
                    if not is_there]  # fmt: skip
         if missing:

@@ -287,15 +287,15 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         "contacts[0].active",
         "one of pressed",
     ),
-    "unknown stage of a cycle of wear": (
-        put("results", "wear", {"cycle": ["pressed", "later"]}),
-        "results.wear.cycle",
+    "unknown stage of wear": (
+        put("results", "wear", {"since": "pressed", "until": "later"}),
+        "results.wear.until",
         "one of pressed",
     ),
-    "cycle of wear of one stage": (
-        put("results", "wear", {"cycle": ["pressed"]}),
-        "results.wear.cycle",
-        "must have 2 or more",
+    "wear without its first stage": (
+        put("results", "wear", {"until": "pressed"}),
+        "results.wear.since",
+        "is missing",
     ),
     "a line outside of its body": (
         put("results", "lines", "middle", {"body": "lower", "start": [9.0, 0.0], "end": [9, -2]}),
