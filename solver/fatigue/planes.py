@@ -19,8 +19,8 @@ A criterion must be finite, and must not fall where a value of what acts on a pl
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +38,7 @@ _PLANES = 216
 """Number of planes in a scan; neighbours are 9 degrees apart."""
 _NEIGHBOURS = 3
 """Newton's method starts at planes that are better than so many neighbours."""
-_FALLS = 2 * np.sin(0.132) ** 2
+_FALLS = 2 * np.sin(0.136) ** 2
 """Share by which a wave falls from its largest value within the largest angle from a plane of the
 scan."""
 _SIMPLE = 0.02
@@ -223,14 +223,23 @@ def _check(search: Value, values: Array, weights: Array) -> None:
 def _used(kinds: list[Array], search: Value) -> Bools:
     """Return which values on planes (n_kinds, 3) a criterion reads."""
     size = np.repeat([max(own.max(), -own.min(), 1e-100) for own in kinds], 3)
-    values = np.array([1.0, 1.0, 0.1, 10.0]) * size[:, None]
-    values[1::3, 1] *= -1
-    before, used = search(OnPlanes(*values)), np.empty(len(size), dtype=bool)
-    for k in range(len(size)):
-        moved = values.copy()
-        moved[k] += size[k]
-        used[k] = (search(OnPlanes(*moved)) != before).any()
-    return used.reshape(-1, 3)
+    read: set[str] = set()
+
+    class Read(OnPlanes):
+        def __getattribute__(self, name: str) -> Any:
+            read.add(name)
+            return super().__getattribute__(name)
+
+        def __iter__(self) -> Iterator[Array]:
+            read.update(OnPlanes._fields)
+            return super().__iter__()
+
+        def __getitem__(self, place: Any) -> Any:
+            read.update(OnPlanes._fields)
+            return super().__getitem__(place)
+
+    search(Read(*size[:, None]))
+    return np.reshape([name in read for name in OnPlanes._fields[: len(size)]], (-1, 3))
 
 
 def _bounds(paths: Array, circles: Ints) -> tuple[list[Array], list[Array], Array]:

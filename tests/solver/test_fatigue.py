@@ -33,7 +33,15 @@ from solver.fatigue import (
     t_gamma,
 )
 from solver.fatigue.kernels import balls, resolve
-from solver.fatigue.planes import _FULL, OnPlanes, _climbed, _hemisphere, critical_planes
+from solver.fatigue.planes import (
+    _FALLS,
+    _FULL,
+    _NORMALS,
+    OnPlanes,
+    _climbed,
+    _hemisphere,
+    critical_planes,
+)
 from solver.tensors import _PLACES
 from solver.typing import Array
 
@@ -451,3 +459,28 @@ def test_rolling_indices_have_their_limits_where_the_sources_have_them() -> None
     assert energy[0] == pytest.approx(20.0)
     found = crack_damage(np.array([10.0, 15.0, 40.0, 65.0, 175.0, 285.0]))
     np.testing.assert_allclose(found, [0.0, 0.0, 5e-6, 1e-5, 0.0, -1e-5], atol=1e-18)
+
+
+def test_a_criterion_that_takes_the_smaller_of_two_values_has_both() -> None:
+    """Tension 50 sin t with shear 100 sin t: on a dense set of planes the best one has 83.9."""
+    course = np.sin(np.linspace(0.0, 2 * np.pi, 61))
+    stress = np.zeros((1, 61, 6))
+    stress[0, :, 0], stress[0, :, 3] = 50.0 * course, 100.0 * course
+    found = critical_planes(Paths(stress), lambda on: np.minimum(on.shear, on.normal_half))
+    least = min(found.on.shear.item(), found.on.normal_half.item())
+    assert 83.85 < least < 84.5
+
+
+def test_no_plane_is_farther_from_those_of_the_scan_than_the_bound_says() -> None:
+    rng = np.random.default_rng(3)
+    largest, width = 0.0, 1.0
+    normals = rng.standard_normal((100_000, 3))
+    for _ in range(6):
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        angle = np.arccos(np.minimum(np.abs(normals @ _NORMALS.T).max(axis=1), 1.0))
+        largest = max(largest, float(angle.max()))
+        width /= 4
+        far = normals[np.argsort(-angle)[:200]]
+        normals = (far[:, None] + width * rng.standard_normal((200, 100, 3))).reshape(-1, 3)
+    assert 0.1355 < largest
+    assert 2 * np.sin(largest) ** 2 < _FALLS

@@ -295,7 +295,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     "wear without its first stage": (
         put("results", "wear", {"until": "pressed"}),
         "results.wear.since",
-        "is missing",
+        "must be given",
     ),
     "a line outside of its body": (
         put("results", "lines", "middle", {"body": "lower", "start": [9.0, 0.0], "end": [9, -2]}),
