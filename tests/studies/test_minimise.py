@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 
 from residua.cli import main
-from solver.derivatives.asked import named
-from solver.results.quantities import Quantity
 from solver.results.record import Record, Status
 from studies import Store, Study, StudyError, estimate, open_study, run_study
 from studies.kinds import found_of
@@ -48,36 +46,10 @@ def numbers(run: FakeParameters, values: Any, monitor: Any) -> Iterator[Record]:
             yield replace(own, scalars=dict(own.scalars) | {OF: valley(x, y), BOUND: x * y})
 
 
-def sloped(run: FakeParameters, values: Any, monitor: Any) -> Iterator[Record]:
-    """Yield the same with slopes, which no run has where friction is above 0.85."""
-    for each in numbers(run, values, monitor):
-        x, y = each.parameters.load_ratio, run.friction if run.friction < 0.85 else np.nan
-        slopes = {OF: (3 * x - y - 1.6, 3 * y - x - 1.6), BOUND: (y, x)}
-        names = ("load_ratio", "friction")
-        own = {
-            named(of, by): at
-            for of, row in slopes.items()
-            for by, at in zip(names, row, strict=True)
-        }
-        yield replace(each, scalars=dict(each.scalars) | (own if each.scalars else {}))
-
-
 SCENE = Canned(
     name="valley", summary="a number under a bound", parameters=FakeParameters,
     branch="load_ratio", records=numbers,
 )  # fmt: skip
-
-
-SLOPED = replace(
-    SCENE,
-    name="sloped",
-    records=sloped,
-    quantities=tuple(
-        Quantity(name=named(of, by), long_name="slope")
-        for of in (OF, BOUND)
-        for by in ASKED["ranges"]
-    ),
-)
 
 
 def study(scene: Canned = SCENE, sweep: Any = None, **asked: Any) -> Study:
@@ -126,29 +98,6 @@ def test_three_starts_find_the_least_number_under_a_condition(
     assert runs == len(outcome.computed)
     assert found.marks[0]["friction"][0] == pytest.approx(0.8 if not where else 0.5, abs=0.05)
     assert not found.warning
-
-
-@pytest.mark.parametrize(
-    ("first", "share"),
-    [
-        ({}, 0.5),
-        ({"load_ratio": 1.1, "friction": 0.6}, 1.1),
-        ({"load_ratio": 0.3, "friction": 0.88}, 1.1),
-    ],
-)
-def test_slopes_take_half_of_the_runs_and_none_is_needed(
-    tmp_path: Path, first: dict[str, float], share: float
-) -> None:
-    """The second search begins where runs fail, the third where they lack slopes."""
-    runs = []
-    for scene in (SLOPED, SCENE):
-        out = tmp_path / scene.name
-        outcome = run_study(study(scene, first=first, starts=1), Store(out), workers=0)
-        runs.append(len(outcome.computed))
-        with open_study(outcome.dataset) as dataset:
-            there = dataset[OF].where(dataset[BOUND] < 0.25 + 1e-6)
-            assert there.min().item() == pytest.approx(LEAST, rel=0.01)
-    assert runs[0] <= share * runs[1]
 
 
 def test_a_failed_run_is_stored_and_the_search_goes_on(tmp_path: Path) -> None:
