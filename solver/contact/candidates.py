@@ -108,7 +108,7 @@ class Candidates(OnParts):
         """Return the conditions (m, k) per rigid motion (n_dofs, k) of a part [mm].
 
         Gaps change along the master's normals (``turned``); `of_part` returns the motions along
-        the forces, which act along the slave's normals.
+        the forces (see `Pairing`).
         """
         moved = self.of_part(part, rigid)
         if moved.size:

@@ -359,6 +359,8 @@ def _area_per_xi(surface: Surface, powers: Array, xi: Array) -> Array:
     return np.asarray(np.hypot(*along) * surface.depth(_value(powers, xi)))
 
 
+_KINK = 5.0
+"""Angle between two edges [degrees]: with a larger one their surface is not smooth."""
 _CORNER = float(np.cos(np.radians(40.0)))
 """Cosine of the angle between the normals of two edges: they form a corner at a larger angle."""
 _STRAIGHT = 1e-6
@@ -387,7 +389,7 @@ def end_normals(x: Array, surface: Surface) -> Array:
     undeformed body, and at the ends of the chain, each edge keeps its own normal.
     """
     start, end = _edge_normal(x, surface, -1.0), _edge_normal(x, surface, 1.0)
-    smooth = _smooth(surface)
+    smooth = _meets(surface) > _CORNER
     mean = end[:, :-1] + start[:, 1:]
     mean /= np.linalg.norm(mean, axis=0)
     start[:, 1:] = np.where(smooth, mean, start[:, 1:])
@@ -395,11 +397,11 @@ def end_normals(x: Array, surface: Surface) -> Array:
     return np.stack([start, end], axis=1)
 
 
-def _smooth(surface: Surface) -> Bools:
-    """Return whether the undeformed surface has no corner at each of its inner vertices."""
+def _meets(surface: Surface) -> Array:
+    """Return the cosines of the angles (n_edges - 1,) between edges of the undeformed surface."""
     before = _edge_normal(surface.X, surface, 1.0)[:, :-1]
     after = _edge_normal(surface.X, surface, -1.0)[:, 1:]
-    return np.asarray((before * after).sum(axis=0) > _CORNER)
+    return np.asarray((before * after).sum(axis=0))
 
 
 def end_turns(x: Array, surface: Surface) -> Array:
@@ -408,7 +410,7 @@ def end_turns(x: Array, surface: Surface) -> Array:
     Shape (2, n_edges, 3, k, 2): at starts and ends, by the k nodes of the edge before, of the edge
     itself, and of the edge after it.
     """
-    edges, half = surface.edges, _smooth(surface)[:, None, None] / 2
+    edges, half = surface.edges, (_meets(surface) > _CORNER)[:, None, None] / 2
 
     def turns(xi: float) -> Array:
         d = shape_derivatives(np.array(xi), edges.shape[1])
@@ -423,6 +425,11 @@ def end_turns(x: Array, surface: Surface) -> Array:
     out[0, 1:, 1] -= half * start[1:]
     out[1, :-1, 1] -= half * end[:-1]
     return out
+
+
+def is_smooth(surface: Surface) -> bool:
+    """Whether its edges meet without kinks, so that their own normals may be those of forces."""
+    return bool((_meets(surface) > np.cos(np.radians(_KINK))).all())
 
 
 def is_curved(surface: Surface) -> bool:

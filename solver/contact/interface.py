@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.contact.geometry import Pairing, is_curved, pair
+from solver.contact.geometry import Pairing, is_curved, is_smooth, pair
 from solver.contact.overlap import check_overlap, largest_overlap
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
@@ -36,7 +36,7 @@ class Interface:
     ``hot`` is the thermal softening of slave and master; ``reach`` the largest overlap [mm] at
     which surfaces still face each other; ``reference`` the pairing before loading, which small
     sliding keeps. ``along_master`` says that forces act along the master's normals. Those of a
-    curved rigid body are exact, those of a surface that bends around it are not: forces along them
+    smooth rigid body are exact, those of a surface that bends around it are not: forces along them
     work as the body slides. Along the slave's normals, a force and its reaction have one line of
     action, which an axisymmetric body does not need.
     """
@@ -220,13 +220,13 @@ def interface_of(
         parts=both,
         reach=reach,
         reference=reference if small else None,
-        along_master=_round_tool(both[1], master_surface),
+        along_master=_revolves(both[1], master_surface),
     )
 
 
-def _round_tool(part: Part, surface: Surface) -> bool:
-    """Whether a surface is that of a rigid body of revolution, and its normal changes along it."""
-    return isinstance(part, RigidPart) and surface.thickness is None and is_curved(surface)
+def _revolves(part: Part, surface: Surface) -> bool:
+    """Whether a surface is a smooth one of a rigid body of revolution."""
+    return isinstance(part, RigidPart) and surface.thickness is None and is_smooth(surface)
 
 
 def _hot(part: Part, surface: Surface) -> Softening | None:

@@ -9,8 +9,9 @@ motions q of bodies held by contact alone. With ``F = (N, T)`` (without friction
     s = min_k (slope_k N + level_k),  the lines of a friction law (`solver.model.friction`)
 
 G equals A unless the normals of the two surfaces differ under a hat: forces act along the slave's
-normals, gaps change along the master's. With A a ring that rests on two vertices could turn without
-opening either. D is zero unless forces on a floating body of large strain do not turn with it.
+normals (or those of a rigid tool), gaps change along the master's. With A a ring that rests on two
+vertices could turn without opening either. D is zero unless forces on a floating body of large
+strain do not turn with it.
 """
 
 from __future__ import annotations

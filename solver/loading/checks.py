@@ -7,6 +7,7 @@ a load that moves it has no equilibrium.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from solver.fem.rigid import RigidPart
 from solver.fem.wheel import Wheel
 from solver.loading.program import Program
 from solver.loading.step import moving
+from solver.materials.elastic_plastic import ElasticPlastic
 from solver.materials.law import Law
 from solver.model.loads import TravellingPressure
 from solver.model.pairs import ContactPair
@@ -74,13 +76,14 @@ _ALONG = 0.1
 def uncarried(material: Law, shear: float) -> NotConverged | None:
     """Return the error if a shear [MPa] flows the surface without bound or very far, else None.
 
-    Linear hardening carries any shear in the end, but a small modulus only at a plastic strain that
-    no small-strain analysis allows.
+    Hardening that goes on carries any shear in the end, but a weak one only at a plastic strain
+    that no small-strain analysis allows. Of laws that are not made of a curve and back stresses
+    only a shear without bound is known.
     """
-    linear = material.linear_hardening
-    if linear is None or not linear.modulus:
+    if not (material.hardens and isinstance(material, ElasticPlastic)):
         return too_much_shear(material, shear)
-    carried = material.surface.shear(linear.yield_stress + linear.modulus * FAR)
+    flowed = replace(material.initial(1, 6), accumulated=np.full(1, FAR))
+    carried = material.surface.shear(material.strength(flowed).item())
     if shear <= carried:
         return None
     return Runaway(

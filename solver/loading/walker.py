@@ -185,8 +185,11 @@ class Walker:
         if reached is None:
             return None
         history = (*reached.history, *start.point.history[-1:])
-        back = replace(start.point, tally=reached.tally, history=history, met=reached.met)
-        points = {stages[0].name: reached.now, stages[-1].name: start.point.now}
+        unloaded = _as_near(start.point.now, reached.now)
+        back = replace(
+            start.point, now=unloaded, tally=reached.tally, history=history, met=reached.met
+        )
+        points = {stages[0].name: reached.now, stages[-1].name: unloaded}
         return self._closed(replace(start, point=back, points=points), program)
 
     def _along(self, walk: _Walk, program: Program, first: int, end: int) -> _Walk:
@@ -304,3 +307,9 @@ def _repeated(walk: _Walk, cycle: int) -> _Walk:
         traces=(*walk.traces, walk.traces[-cycle]) if walk.traces else (),
         past=(*walk.past[1:], (points, False)),
     )
+
+
+def _as_near(now: Converged, loaded: Converged) -> Converged:
+    """Return a state whose neighbours have come as near to a switch as those under load."""
+    both = zip(now.beside, loaded.beside, strict=True)
+    return replace(now, beside=tuple(replace(own, near=other.near) for own, other in both))

@@ -261,6 +261,11 @@ def test_the_range_ends_where_a_bar_yields(gap: float, caplog: pytest.LogCapture
     ]
 
 
+def test_an_elastic_run_in_one_increment_ends_its_range_where_it_would_yield() -> None:
+    at, control = {"strength": 200.0, "load": 200.0 * (1 - 3e-4)}, PathControl(load_step=0.1)
+    assert ranges(bar, at, control) == pytest.approx([3e-4] * 2, rel=2e-3)
+
+
 @pytest.mark.parametrize("law", ["recall", "tresca"])
 def test_sets_hold_up_to_the_end_of_the_range_and_not_beyond(law: str) -> None:
     def pressed(friction: float, strength: float, pressure: float) -> Model:

@@ -236,7 +236,7 @@ class Goal(Kind):
     @property
     def halves(self) -> bool:
         """Whether a search halves its bracket by single runs."""
-        return not self.branch and (self.kind != "at" or self._sloped)
+        return not self.branch and self.kind != "at"
 
     @property
     def parts(self) -> int:
@@ -301,7 +301,7 @@ class Goal(Kind):
     @property
     def expects(self) -> bool:
         """Whether a search begins where its neighbours let expect the goal."""
-        return self.halves and self.kind != "at"
+        return self.halves
 
     def most_runs(self, places: int) -> int:
         """Return the most runs of the searches at so many places."""
@@ -563,8 +563,6 @@ class Search(Chooser):
     def _halved(self) -> list[float]:
         """Return the next value of a search that halves its bracket; none at its end."""
         goal, (first, last) = self.goal, self.goal.between
-        if goal.kind == "at" and not self.rows:
-            return [first]  # it decides whether the number rises
         low = first if math.isnan(self.low) else self.low
         high = last if math.isnan(self.high) else self.high
         if not goal.narrow(low, high):
