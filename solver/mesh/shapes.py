@@ -192,7 +192,8 @@ def fillet(
     depth = [(0.0, n.size, n.radius) for n in near]
     across = math.hypot(narrow + r, below + r)  # length of the longest line across
     spread = _Spread(size, growth)
-    along_it = spread.lines("near", (0.0, float(marks[-1])), along, marks[1:3].tolist())
+    through = [float(marks[1]), middle, float(marks[2])]  # also the corner of axis and bottom
+    along_it = spread.lines("near", (0.0, float(marks[-1])), along, through)
     across_it = spread.lines("near", (0.0, across), depth)
     few((len(along_it) - 1) * (len(across_it) - 1))
 

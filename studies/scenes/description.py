@@ -23,6 +23,7 @@ from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import ACCURACY, NAMED, OPEN, ParameterTable, SceneFile
 from studies.toml import read_given, toml_of
 
+_NUMBER = "must be a number, or an expression with parameters as $name"
 PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
 """Entries of a scene file without expressions of parameters, and the derived numbers."""
 
@@ -269,7 +270,7 @@ class Description:
                 allowed = "is a parameter too: give it another name"
                 mistakes[where] = StudyError(dotted(where), text, allowed)
             elif where not in mistakes and not _is_value(value):
-                mistakes[where] = StudyError(dotted(where), text, "must be a number")
+                mistakes[where] = StudyError(dotted(where), text, _NUMBER)
             known[name] = None if where in mistakes else value
         plain = {key: value for key, value in self.content.items() if key in PLAIN}
         rest = {key: value for key, value in self.completed.items() if key not in PLAIN}

@@ -139,3 +139,18 @@ def test_a_shape_that_cannot_be_is_refused_by_its_argument(
     with pytest.raises(ModelError) as caught:
         make()
     assert caught.value.field == field
+
+
+def test_a_fillet_has_no_folded_element_whatever_its_sizes() -> None:
+    """One that spans the corner of axis and bottom would be."""
+    rng = np.random.default_rng(0)
+    for k in range(60):
+        wide = rng.uniform(2.0, 10.0)
+        narrow = wide * rng.uniform(0.2, 0.8)
+        radius = (wide - narrow) * rng.uniform(0.05, 0.95)
+        lengths = rng.uniform(1.0, 20.0), radius * 1.05 + rng.uniform(0.0, 10.0)
+        near = [Near(at=(narrow, radius), size=radius * 10 ** rng.uniform(-1.3, 0.0))]
+        mesh = fillet(
+            wide, narrow, radius, lengths, size=rng.uniform(0.2, 2.0), near=near if k % 3 else ()
+        )
+        check_mesh(mesh, "bar", element_type("quad4"))
