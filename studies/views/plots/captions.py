@@ -140,7 +140,10 @@ def _computed(run: xr.Dataset, name: str) -> str:
 
 
 def _idle(run: xr.Dataset, given: Mapping[str, Any]) -> set[str]:
-    """Return the parameters that change nothing in a run, such as a load ratio beside a force."""
+    """Return the parameters that change nothing in a run, such as a load ratio beside a force.
+
+    Those that every pass of a sequence has for itself do not either.
+    """
     scene = scene_of(run.attrs)
     own = {str(name): each.item() for name, each in run.coords.items() if each.ndim == 0}
     known = parameters_of(scene)
@@ -149,7 +152,9 @@ def _idle(run: xr.Dataset, given: Mapping[str, Any]) -> set[str]:
         parameters = build(scene, {k: plain(v, known[k].default) for k, v in values.items()})
     except ModelError:  # consistent only with values that differ between the runs
         return set()
-    return {name for name in known if unmet(parameters, name)}
+    passes = [set(own) for own in getattr(parameters, "sequence", ())]
+    each = set.intersection(*passes) if passes else set()
+    return each | {name for name in known if unmet(parameters, name)}
 
 
 def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -526,6 +526,14 @@ def test_a_caption_leaves_out_what_changes_nothing() -> None:
     assert "force 8000" in words and "load ratio" not in words
 
 
+def test_a_caption_leaves_out_the_load_of_a_run_whose_passes_have_their_own() -> None:
+    passes = [{"load": 35e3, "traction": 0.1}, {"load": 110e3}]
+    given = {"load": 110e3, "traction": 0.2, "sequence": passes}
+    attrs = {"scene": "wheel_rail", "parameters": json.dumps(given)}
+    words = setting(xr.Dataset(attrs=attrs)).replace("\N{NO-BREAK SPACE}", " ")
+    assert words.endswith("traction 0.2 · sequence 2 tables") and "110" not in words
+
+
 def test_a_section_is_drawn_with_the_wheel_above_it() -> None:
     axes, _ = mesh_of(map_figure(rolled(), "map_mises"))
     assert names_of(axes) == ["wheel before contact"]
