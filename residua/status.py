@@ -12,7 +12,6 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 def complain(reason: object, status: int) -> int:
     """Print why a command ends, and return its exit status."""
-    print(
-        f"residua: {str(reason)[:LONGEST]}", file=sys.stderr
-    )  # without imports, see `wrong_package`
+    # without imports, see `wrong_package`
+    print(f"residua: {str(reason)[:LONGEST]}", file=sys.stderr)
     return status

@@ -273,7 +273,7 @@ class LogStrain:
 def gradient_operator(values: Array, gradients: Array, radius: Array, kinematics: str) -> Array:
     """Return the rows of displacement gradients by nodal displacements [1/mm].
 
-    Parameters are those of `kinematics.strain_operator`, in two dimensions; the result is
+    Parameters are those of `deformation.strain_operator`, in two dimensions; the result is
     (n_elements, n_points, 4 or 5, 2 n_nodes), rows xx, xy, yx, yy and, with an axis, hoop.
     """
     n_nodes, n_elements, n_points = values.shape

@@ -60,6 +60,9 @@ def read(path: Path) -> dict[str, Any]:
         raise ModelError("path", str(path), allowed)
     try:
         found: dict[str, Any] = pickle.loads(stored)
+    except (AttributeError, ModuleNotFoundError) as error:
+        allowed = f"is of a model that this version of the solver, or your own files, lack: {error}"
+        raise ModelError("path", str(path), allowed) from None
     except Exception as error:  # a damaged file can raise any exception
         raise ModelError("path", str(path), f"is damaged: {error}") from None
     return found

@@ -57,7 +57,7 @@ class Readable(NamedTuple):
     ----------
     tables : with stand-ins for wrong tables; None if too little is left
     wrong : the mistakes by place
-    own : see `mending.Mended`
+    own : see `refusals.Mended`
     """
 
     tables: SceneFile | None
