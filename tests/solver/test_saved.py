@@ -45,6 +45,10 @@ def test_other_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     path.write_bytes(path.read_bytes()[:-3])
     with pytest.raises(ModelError, match="is damaged"):
         Solution.load(path)
+    saved.write(path, {"model": Material(youngs_modulus=2e5, poisson_ratio=0.3)})
+    path.write_bytes(path.read_bytes().replace(b"solver.materials", b"solver.mbterials"))
+    with pytest.raises(ModelError, match=r"this version .* lack: No module named"):
+        Solution.load(path)
     monkeypatch.setattr(saved, "__version__", "9.9")
     with pytest.raises(ModelError, match=r"is of version .* of the solver, and this is 9\.9"):
         Solution.load(path)
