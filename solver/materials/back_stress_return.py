@@ -11,8 +11,8 @@ import numpy as np
 from solver.materials.back_stress import ArmstrongFrederick, BackStress
 from solver.materials.curves import Curve
 from solver.materials.elasticity import Elasticity
-from solver.materials.principal_return import falling_root
 from solver.materials.radial_return import SQRT23
+from solver.materials.scalar import falling_root
 from solver.materials.state import PlasticState, Response
 from solver.tensors import deviator, identity, von_mises
 from solver.typing import Array, Ints

@@ -16,7 +16,8 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.materials.curves import Curve
-from solver.materials.principal_return import Returned, falling_root, grown
+from solver.materials.principal_return import Returned, grown
+from solver.materials.scalar import falling_root
 from solver.materials.yield_surface import Tension, YieldSurface
 from solver.tensors import dyad, principal
 from solver.typing import Array

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import ModelError
-from studies.definition.points import read_table
+from studies.definition.rows import read_table
 from studies.errors import StudyError
 from studies.kinds import KINDS
 from studies.materials import read_material

@@ -11,7 +11,7 @@ import pytest
 from solver import ModelError, Record
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
-from solver.rolling.scenes.schedule import CUT, deviations
+from solver.rolling.scenes.sequence import CUT, deviations
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact
 from solver.rolling.scenes.wheel_rail_setup import RolledRail

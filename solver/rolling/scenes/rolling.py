@@ -27,7 +27,8 @@ from solver.loading.program import HALVINGS
 from solver.materials.elastic_plastic import Material
 from solver.parameters import Accuracy, Length, Other, by_accuracy, described
 from solver.rolling.plane.lines import MOST_COLUMNS, window_elements
-from solver.rolling.scenes.schedule import Schedule, block_of
+from solver.rolling.scenes.schedule import Schedule
+from solver.rolling.scenes.sequence import block_of
 from solver.rolling.scenes.wheel_parameters import WheelParameters, check_given_shear
 from solver.scenes.scene import Scene
 

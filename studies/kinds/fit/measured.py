@@ -23,8 +23,8 @@ from solver.files import number_of
 from solver.scenes import Scene
 from solver.typing import Array
 from studies.definition.parameters import in_unit
-from studies.definition.points import read_table
 from studies.definition.quantity import Line, Read, Variable, known_variable, picked
+from studies.definition.rows import read_table
 from studies.definition.schema import Context, StudyTable, is_finite
 from studies.definition.sweep import linked_values
 from studies.errors import StudyError, Unchecked, one_of
