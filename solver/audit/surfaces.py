@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.audit.plain import load_factor
-from solver.contact.geometry import is_curved, is_smooth
+from solver.contact.geometry import is_curved
 from solver.contact.overlap import largest_overlap
 from solver.contact.state import State
 from solver.contact.system import System
@@ -116,8 +116,7 @@ class Surfaces:
         )
 
         self.curved = is_curved(self.slave) or is_curved(self.master)
-        rigid = pair.master[0] not in system.names
-        self._tool = rigid and self.master.thickness is None and is_smooth(self.master)
+        self._along_master = system.interfaces[number].along_master
         bodies = [system.model.body(name) for name, _ in (pair.slave, pair.master)]
         self._overlap = largest_overlap(*bodies)
         narrow = [float(body.box.min()) for body in bodies]
@@ -226,7 +225,7 @@ class Surfaces:
             partner = _Partner(master.X, master, on_slave(slave.X), n, self._overlap)
         if self.pair.presence is not None and not load_factor(self.pair.presence, state.time):
             true.faces, partner.faces = 0 * true.faces, 0 * partner.faces  # an absent pair
-        push = partner.inward(xm) if self.finite and self._tool else n
+        push = partner.inward(xm) if self.finite and self._along_master else n
         t = np.stack([-push[1], push[0]])
         apart = partner.of(xm) - on_slave(xs)
         moved = on_slave(xs - xs0) - partner.of(xm - xm0)

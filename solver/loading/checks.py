@@ -26,7 +26,7 @@ from solver.model.loads import TravellingPressure
 from solver.model.pairs import ContactPair
 from solver.typing import Array
 
-FAR = 1.0
+_FAR = 1.0
 """Equivalent plastic strain beyond which no search for a pass has an answer."""
 
 
@@ -82,13 +82,13 @@ def uncarried(material: Law, shear: float) -> NotConverged | None:
     """
     if not (material.hardens and isinstance(material, ElasticPlastic)):
         return too_much_shear(material, shear)
-    flowed = replace(material.initial(1, 6), accumulated=np.full(1, FAR))
+    flowed = replace(material.initial(1, 6), accumulated=np.full(1, _FAR))
     carried = material.surface.shear(material.strength(flowed).item())
     if shear <= carried:
         return None
     return Runaway(
         f"the prescribed shear, {shear:.4g} MPa, is above {carried:.4g} MPa, which the surface "
-        f"carries at a plastic strain of {FAR:.0%}, far beyond small strains; the material "
+        f"carries at a plastic strain of {_FAR:.0%}, far beyond small strains; the material "
         "hardens, this is not its limit"
     )
 

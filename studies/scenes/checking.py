@@ -270,10 +270,14 @@ def _results(scene: tables.SceneFile) -> Iterator[StudyError]:
     for side in taken.surfaces:
         yield from _one_of("results.surfaces", side.partition(".")[0], scene.bodies)
     for word in taken.words:
-        for entry, parts in (("body", scene.bodies), ("rigid", scene.rigid)):
-            part = getattr(getattr(taken, word, None), entry, None)
-            if part is not None:
-                yield from _one_of(f"results.{word}.{entry}", part, parts)
+        ends = scene.stage_names
+        known: dict[str, Iterable[str]] = {
+            "body": scene.bodies, "rigid": scene.rigid, "since": ends, "until": ends,
+        }  # fmt: skip
+        for entry, names in known.items():
+            name = getattr(getattr(taken, word, None), entry, None)
+            if name is not None:
+                yield from _one_of(f"results.{word}.{entry}", name, names)
     if not math.isclose(math.hypot(*taken.axis.along), 1.0, rel_tol=1e-9):
         yield StudyError("results.axis.along", list(taken.axis.along), "must have the length 1")
     for name, line in scene.results.lines.items():
@@ -301,10 +305,6 @@ def unmet_needs(scene: tables.SceneFile) -> Iterator[StudyError]:
         "release": (bool(scene.released), "a last stage that releases the bodies"),
     }
     for word in taken.words:
-        given = getattr(taken, word, None)
-        for entry in ("since", "until"):
-            if stage := getattr(given, entry, ""):
-                yield from _one_of(f"results.{word}.{entry}", stage, scene.stage_names)
         missing = [words for need in outputs()[word].needs for is_there, words in [there[need]]
                    if not is_there]  # fmt: skip
         if missing:
