@@ -12,6 +12,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from tests.service.servers import PATIENCE
+
 ARGUMENTS = (
     "--no-sandbox", "--headless", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
@@ -31,6 +33,13 @@ def chromium() -> Iterator[Any]:
         browser = driver.chromium.launch(executable_path=found, args=[*ARGUMENTS])
         yield browser
         browser.close()
+
+
+def patient(browser: Any, **given: Any) -> Any:
+    """Return a context of the browser whose pages wait as long as other tests."""
+    context = browser.new_context(**given)
+    context.set_default_timeout(1000 * PATIENCE)
+    return context
 
 
 @contextmanager

@@ -23,6 +23,9 @@ PROGRAM = (
     "import sys; from service.app import serve; serve('127.0.0.1', int(sys.argv[1]), sys.argv[2])"
 )
 
+PATIENCE = 240.0
+"""Seconds after which a test no longer waits for what must happen: many times what it takes, since
+other work may have the cores."""
 NOWHERE = {
     "RESIDUA_SCHEDULER": "tcp://127.0.0.1:1",
     "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s",
@@ -55,7 +58,7 @@ def free_port() -> int:
         return port
 
 
-def wait_until(condition: Callable[[], Any], seconds: float = 60.0, pause: float = 0.1) -> Any:
+def wait_until(condition: Callable[[], Any], seconds: float = PATIENCE, pause: float = 0.1) -> Any:
     """Return the first true answer of ``condition``, which is asked at intervals."""
     deadline = time.monotonic() + seconds
     while not (answer := condition()):
@@ -67,7 +70,7 @@ def wait_until(condition: Callable[[], Any], seconds: float = 60.0, pause: float
 def end(process: subprocess.Popen[bytes]) -> None:
     """End a process that may have ended."""
     process.terminate()
-    process.wait(timeout=30.0)
+    process.wait(timeout=PATIENCE)
 
 
 @contextmanager
@@ -105,7 +108,7 @@ class Server:
     process: subprocess.Popen[bytes] | None = None
 
     def __post_init__(self) -> None:
-        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=30.0)
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=PATIENCE)
 
     @property
     def log(self) -> Path:
@@ -146,7 +149,7 @@ class Server:
         assert self.process is not None
         self.process.send_signal(signal.SIGTERM)
         # The server ends its work, and then itself by the signal it was sent.
-        assert self.process.wait(timeout=30.0) == -signal.SIGTERM
+        assert self.process.wait(timeout=PATIENCE) == -signal.SIGTERM
         assert "Application shutdown complete" in (self.home / "service.log").read_text()
 
     def close(self) -> None:
@@ -169,14 +172,14 @@ class Server:
         content: dict[str, Any] = answer.json()
         return content
 
-    def finished(self, study_id: str, seconds: float = 90.0) -> dict[str, Any]:
+    def finished(self, study_id: str) -> dict[str, Any]:
         """Wait for the end of a study, and return where it stands."""
 
         def ended() -> dict[str, Any] | None:
             study = self.study(study_id)
             return study if study["status"] not in ("accepted", "running") else None
 
-        study: dict[str, Any] = wait_until(ended, seconds, pause=0.25)
+        study: dict[str, Any] = wait_until(ended, pause=0.25)
         return study
 
     def computed(self) -> list[str]:

@@ -13,7 +13,7 @@ import xarray as xr
 
 from service.keys import Keys, Scope
 from studies import open_study
-from tests.service.browser import barriers, chromium, opened
+from tests.service.browser import barriers, chromium, opened, patient
 from tests.service.servers import COARSE_PUNCH, NOWHERE, Server, fake_study
 
 STUDY = {
@@ -37,7 +37,7 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def context(browser: Any) -> Any:
     """Give what the pages of most tests share; a page has a session of its own."""
-    return browser.new_context()
+    return patient(browser)
 
 
 @pytest.fixture(scope="module")
@@ -283,7 +283,7 @@ def test_a_study_of_points_is_watched_to_its_end_and_its_runs_are_marks(
     watched = {"name": "watched", "scene": "fake", "parameters": {"seconds": 0.5}}
     study_id = service.post(watched | {"points": points})
     with opened(context, base(service) + f"/ui/studies/{study_id}?x=load_ratio") as page:
-        page.wait_for_selector("[data-live=status] .failed", timeout=60_000)
+        page.wait_for_selector("[data-live=status] .failed")
         page.wait_for_selector(".counts li:has(.ok) b")
         assert page.locator(".counts li:has(.ok) b").inner_text() == "2"
         assert page.locator(".runs tbody .status.limit_load").count() == 1
@@ -316,7 +316,7 @@ def test_a_study_is_made_by_the_form(context: Any, service: Server) -> None:
             ".code >> nth=0"
         )
         page.click("button[name=submit]")
-        page.wait_for_selector("[data-live=status] .successful", timeout=60_000)
+        page.wait_for_selector("[data-live=status] .successful")
         assert page.locator(".runs tbody tr").count() == 6
 
 
@@ -345,7 +345,7 @@ def test_a_scene_that_is_refused_stays_chosen(
 def test_a_page_without_scripts_has_table_and_picture(
     browser: Any, service: Server, study: str
 ) -> None:
-    plain = browser.new_context(java_script_enabled=False)
+    plain = patient(browser, java_script_enabled=False)
     with opened(plain, f"{base(service)}/ui/studies/{study}") as page:
         assert page.locator(".runs tbody tr").count() == 4
         size = page.locator("[data-chart=map] img").evaluate("image => image.naturalWidth")
@@ -369,7 +369,7 @@ def test_a_caller_signs_in_and_out(browser: Any, locked: tuple[Server, dict[Scop
         "/studies", json=fake_study("kept"), headers={"authorization": f"Bearer {keys['submit']}"}
     )
     page_of = f"/ui/studies/{answer.json()['id']}"
-    with opened(browser.new_context(), base(server) + page_of) as page:
+    with opened(patient(browser), base(server) + page_of) as page:
         assert "/ui/sign-in" in page.url
         page.fill("[name=key]", keys[Scope.SUBMIT])
         page.click("text=Sign in >> nth=-1")
@@ -392,7 +392,7 @@ def test_a_wrong_key_and_a_weak_one_are_refused(
     headers = {"authorization": f"Bearer {keys[Scope.ADMIN]}"}
     answer = server.client.post("/studies", json=fake_study("other"), headers=headers)
     study_id = answer.json()["id"]
-    context = browser.new_context(base_url=base(server))
+    context = patient(browser, base_url=base(server))
     page = context.new_page()
     page.goto("/ui/sign-in")
     page.fill("[name=key]", "residua_wrong")

@@ -21,7 +21,14 @@ from service.settings import Settings
 from studies import open_netcdf
 from studies.execution.certificates import OWNERS
 from tests.architecture.sources import ROOT
-from tests.service.servers import end, environment, fake_study, free_port, wait_until
+from tests.service.servers import (
+    PATIENCE,
+    end,
+    environment,
+    fake_study,
+    free_port,
+    wait_until,
+)
 
 COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())
 SERVICES: dict[str, Any] = COMPOSE["services"]
@@ -283,7 +290,7 @@ class Stage:
         return httpx.Client(
             base_url=f"http://127.0.0.1:{self.ports['8000']}",
             headers={"authorization": f"Bearer {self.key}"},
-            timeout=30.0,
+            timeout=PATIENCE,
         )
 
 
@@ -293,7 +300,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
     with ExitStack() as stack:
         stage = Stage(tmp_path_factory.mktemp("stage"), stack)
         stage.start("certificates")
-        assert stage.processes["certificates"].wait(timeout=60.0) == 0
+        assert stage.processes["certificates"].wait(timeout=PATIENCE) == 0
         stage.client().close()
         for name in LASTING:
             stage.start(name)
@@ -305,7 +312,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 def test_the_three_processes_compute_a_posted_study(stage: Stage) -> None:
     with stage.client() as client:
         url = client.post("/studies", json=fake_study("composed")).headers["location"]
-        wait_until(lambda: client.get(url).json()["status"] == "successful", 60.0)
+        wait_until(lambda: client.get(url).json()["status"] == "successful")
         fetched = stage.home / "fetched.nc"
         fetched.write_bytes(client.get(f"{url}/dataset.nc").content)
     with open_netcdf(fetched) as dataset:
@@ -317,12 +324,12 @@ def test_a_scheduler_that_restarts_costs_no_study(stage: Stage) -> None:
     study["sweep"]["friction"] = [0.0, 0.1, 0.2]
     with stage.client() as client:
         url = client.post("/studies", json=study).headers["location"]
-        wait_until(lambda: client.get(url).json()["counts"].get("ok", 0) >= 2, 60.0)
+        wait_until(lambda: client.get(url).json()["counts"].get("ok", 0) >= 2)
         stage.processes["scheduler"].kill()
         for name in ("scheduler", "worker"):
-            stage.processes[name].wait(timeout=30.0)
+            stage.processes[name].wait(timeout=PATIENCE)
             stage.start(name)  # as the engine does, see test_every_service_restarts_and_is_watched
-        wait_until(lambda: client.get(url).json()["status"] == "successful", 60.0)
+        wait_until(lambda: client.get(url).json()["status"] == "successful")
         assert client.get(url).json()["counts"] == {"ok": 6}
 
 

@@ -37,7 +37,7 @@ from service.turns import Share, Turn, Turns
 from studies import Store, StoreFull, Study, StudyError
 from studies.errors import Unusable
 from tests.counted import counted
-from tests.service.servers import COARSE_PUNCH, Server, fake_study
+from tests.service.servers import COARSE_PUNCH, PATIENCE, Server, fake_study
 
 CONNECTIONS = 120
 SECONDS = 1.0
@@ -78,7 +78,7 @@ def study(strict: Server) -> dict[str, Any]:
 
 def connected(server: Server) -> socket.socket:
     """Return a connection of its own."""
-    return socket.create_connection(("127.0.0.1", server.port), timeout=15.0)
+    return socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE)
 
 
 def healthy(server: Server) -> bool:

@@ -12,6 +12,7 @@ from service.processes import Starter
 from service.settings import Settings
 from service.view import ViewedFolder
 from studies.execution.forks import Forks
+from tests.service.servers import PATIENCE
 
 
 def main() -> None:
@@ -24,7 +25,7 @@ def test_a_process_that_computes_is_less_urgent_than_the_service(tmp_path: Path)
         with (tmp_path / "lock").open("w") as lock:
             starter = Starter(lock.fileno(), Forks(("service.processes",)))
             process = await starter.start(main.__module__, {})
-            async with asyncio.timeout(30.0):
+            async with asyncio.timeout(PATIENCE):
                 line = await process.stdout.readline()
                 await process.wait()
             process.stdin.close()

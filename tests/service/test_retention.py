@@ -27,6 +27,7 @@ from service.retention import Keeper
 from service.settings import Settings
 from studies import Store, Study
 from studies.execution.access import Access
+from tests.service.servers import PATIENCE
 from tests.service.test_runner import Scripted
 from tests.studies.conftest import compute_here
 from tests.studies.test_goal import search_here
@@ -275,7 +276,7 @@ def test_a_sweep_that_fails_is_told_and_tried_again(
     monkeypatch.setattr("service.retention.shutil.rmtree", moody)
 
     async def work() -> None:
-        async with asyncio.timeout(30.0), place.keeper(size=0).working():
+        async with asyncio.timeout(PATIENCE), place.keeper(size=0).working():
             while place.jobs.page(limit=1, offset=0)[1]:
                 await asyncio.sleep(0.01)
 

@@ -24,6 +24,7 @@ from service.runner import SILENT, Runner
 from service.settings import Settings
 from studies.execution.forks import NEEDED, Forks
 from tests.architecture.sources import ROOT
+from tests.service.servers import PATIENCE
 
 RUN = {"kind": "event", "content": {"kind": "run", "progress": 0.5, "stage": "", "run": "b"}}
 AWAY = {"kind": "wait", "content": {"reason": "the store is busy"}}
@@ -74,7 +75,7 @@ def carried_out(
     runner = Scripted(settings, jobs, pool, Starter(0), lambda _: None, script=list(script))
 
     async def work() -> None:
-        async with asyncio.timeout(30.0), runner.working():
+        async with asyncio.timeout(PATIENCE), runner.working():
             while not jobs.get("a").state.final:
                 await asyncio.sleep(0.01)
 
@@ -128,7 +129,7 @@ def test_a_frozen_process_is_told_of_and_ended(
     runner = Frozen(settings, jobs, Pool(settings, Starter(0)), Starter(0), lambda _: None)
 
     async def work() -> None:
-        async with asyncio.timeout(30.0), runner.working():
+        async with asyncio.timeout(PATIENCE), runner.working():
             while not jobs.get("a").state.final:
                 told.append(jobs.waiting())
                 await asyncio.sleep(0.02)
@@ -157,7 +158,7 @@ def test_what_the_next_study_needs_is_loaded_while_there_is_none(
     runner = Runner(settings, jobs, Pool(settings, starter), starter, lambda _: jobs)
 
     async def work() -> None:
-        async with asyncio.timeout(30.0), runner.working():
+        async with asyncio.timeout(PATIENCE), runner.working():
             while not asked:
                 await asyncio.sleep(0.02)
 

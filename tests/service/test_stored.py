@@ -40,7 +40,7 @@ from studies.scenes import scene as scene_module
 from studies.scenes.scene import FileScene, read_scene
 from studies.storage import seal, shelf
 from tests.architecture.sources import ROOT
-from tests.service.servers import NOWHERE, Server, fake_study, wait_until
+from tests.service.servers import NOWHERE, PATIENCE, Server, fake_study, wait_until
 from tests.service.test_access import Ask, asking
 from tests.service.test_errors import UNKNOWN, problem
 from tests.studies.conftest import compute_here
@@ -515,7 +515,7 @@ def test_a_key_that_is_removed_ends_its_streams(mortal: Server) -> None:
         for _ in tasks:
             await begun.acquire()
         await asyncio.to_thread(keys.remove, "a")
-        await asyncio.wait({tasks[0]}, timeout=20.0)
+        await asyncio.wait({tasks[0]}, timeout=PATIENCE)
         found = list(ended)
         tasks[1].cancel()
         await asyncio.wait(tasks)

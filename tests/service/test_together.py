@@ -96,7 +96,7 @@ def test_a_study_that_nobody_computes_says_so(mortal: Server) -> None:
     mortal.settings = NOWHERE | {"RESIDUA_GRACE_SECONDS": "1"}
     mortal.start()
     study_id = mortal.post(fake_study("alone"))
-    waiting = wait_until(lambda: mortal.client.get("/health").json()["waiting"], 30.0)
+    waiting = wait_until(lambda: mortal.client.get("/health").json()["waiting"])
     assert "no scheduler answers" in waiting[study_id]
     assert mortal.client.get("/health").json()["status"] == "waiting"
     assert mortal.client.delete(f"/studies/{study_id}").json()["status"] == "dismissed"

@@ -28,7 +28,7 @@ from studies.storage import seal
 from studies.storage.combine import combine
 from studies.views.unpacked import Unpacked
 from tests.architecture.sources import ROOT
-from tests.service.servers import wait_until
+from tests.service.servers import PATIENCE, wait_until
 from tests.studies.conftest import compute_here, fake_study
 from tests.studies.test_goal import search_here
 
@@ -257,7 +257,7 @@ def test_the_command_serves_until_it_is_interrupted(folder: tuple[Study, Store])
         assert line.startswith("http://127.0.0.1:")
         assert wait_until(lambda: "whole" in httpx.get(line.split()[0]).text)
         process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=30) == ("", "")
+        assert process.communicate(timeout=PATIENCE) == ("", "")
         assert process.returncode == 0
     finally:
         process.kill()

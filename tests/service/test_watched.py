@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from tests.architecture.sources import ROOT
-from tests.service.servers import free_port, wait_until
+from tests.service.servers import PATIENCE, free_port, wait_until
 
 PORT = free_port()
 # Answers 503 to everything: a sign of life.
@@ -54,14 +54,14 @@ def test_what_answers_lives_and_is_ended_in_order(
     with pytest.raises(subprocess.TimeoutExpired):
         watch.wait(timeout=1.0)
     watch.send_signal(signal.SIGTERM)  # as the engine does to stop a container
-    assert watch.wait(timeout=30.0) == 128 + signal.SIGTERM
+    assert watch.wait(timeout=PATIENCE) == 128 + signal.SIGTERM
     assert not inner.is_running()
 
 
 def test_what_answers_no_more_is_ended() -> None:
     with watched("import time; time.sleep(600)", failures=3) as watch:
         inner = wait_until(lambda: psutil.Process(watch.pid).children())[0]
-        assert watch.wait(timeout=60.0) == 1
+        assert watch.wait(timeout=PATIENCE) == 1
         assert not inner.is_running()
         assert watch.stderr is not None
         assert b"no answer 3 times in a row" in watch.stderr.read()
@@ -69,7 +69,7 @@ def test_what_answers_no_more_is_ended() -> None:
 
 def test_the_exit_status_is_that_of_the_command() -> None:
     with watched("raise SystemExit(2)") as watch:
-        assert watch.wait(timeout=30.0) == 2
+        assert watch.wait(timeout=PATIENCE) == 2
 
 
 def test_kernels_of_the_image_are_copied_to_where_the_compiler_looks_for_them(
