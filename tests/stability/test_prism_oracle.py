@@ -101,6 +101,11 @@ def _mirrored(rolled: Rolled) -> Rolled:
     return replace(rolled, other=other)
 
 
+def _in_more_steps(rolled: Rolled) -> Rolled:
+    given = replace(rolled, record=_mirrored(rolled).other)
+    return replace(rolled, other=_recorded("iterations", lambda n: n + 1)(given).record)
+
+
 TAMPERED: dict[str, tuple[str, Callable[[Rolled], Rolled], set[str]]] = {
     "more traction": (
         "raceway", _touching(traction=lambda t: 1.05 * t),
@@ -119,6 +124,7 @@ TAMPERED: dict[str, tuple[str, Callable[[Rolled], Rolled], set[str]]] = {
         {"symmetric", "other"},
     ),
     "other mirror image": ("raceway", _mirrored, {"other"}),
+    "another in more steps": ("raceway", _in_more_steps, {"other steps"}),
     "stress left at a point": (
         "raceway", _points("unloaded", "stress", _added((0, 17), 1e-3)), {"along"},
     ),
