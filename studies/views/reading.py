@@ -229,8 +229,11 @@ def find_datasets(path: Path | str) -> list[Path]:
     """
     found = present_datasets(path)
     if not found:
-        begun = "; ".join(begun_studies(path))
-        allowed = begun or "must be a data set, a study or an output directory"
+        begun = begun_studies(path)
+        if begun:
+            there = f"residua view {_output(path)} shows the runs that are there"
+            begun += [f"{there}, and gives xarray.open_zarr its address with /studies/ID/zarr"]
+        allowed = "; ".join(begun) or "must be a data set, a study or an output directory"
         raise StudyError("path", str(path), allowed)
     return found
 
@@ -273,6 +276,12 @@ def begun_studies(path: Path | str) -> list[str]:
     begun = [file for file in files if file.is_file() and file.parent.name not in there]
     begun = [file for file in begun if not file.with_name("dataset.nc").is_file()]
     return [f"{_progress(file)}; no data set yet ({file.parent})" for file in begun]
+
+
+def _output(path: Path | str) -> Path:
+    """Return the output directory of a study that has a directory there, or else the path."""
+    path = Path(path)
+    return path.parents[1] if path.parent.name == "studies" else path
 
 
 def _progress(file: Path) -> str:
