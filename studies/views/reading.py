@@ -8,6 +8,7 @@ import logging
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +17,7 @@ import xarray as xr
 
 from studies.definition.identity import is_id
 from studies.definition.study import Study
-from studies.errors import FileDamaged, StudyError
+from studies.errors import FileDamaged, StudyError, cut
 from studies.storage import seal
 from studies.storage.blobs import blobs_at, directory_of, is_address
 from studies.storage.frame import FRACTION
@@ -30,8 +31,8 @@ LATEST = "latest"
 """In the place of a study's name, the study that was computed last."""
 
 _LOG = logging.getLogger("studies")
-_WIDEST = 200
-"""Largest number of characters of the line of a study."""
+_WIDEST = 60
+"""Largest number of characters of an entry in which studies differ."""
 _WAIT = 60.0
 """Timeout of a request to a service [s]."""
 
@@ -90,13 +91,25 @@ def find_study(path: Path | str, name: str | None = None) -> Path:
 
 def _listed(found: list[Path]) -> Iterator[str]:
     """Yield a line for each study of one name: its directory, date, and what differs."""
-    contents = [dict(_flat(_content(each))) for each in found]
+    contents = [{k: json.dumps(v) for k, v in _flat(_content(each))} for each in found]
     keys = dict.fromkeys(key for each in contents for key in each)
     unlike = [k for k in keys if any(each.get(k) != contents[0].get(k) for each in contents)]
+    alike = {k: _alike([each[k] for each in contents if k in each]) for k in unlike}
     for each, content in zip(found, contents, strict=True):
         date = time.strftime("%Y-%m-%d %H:%M", time.localtime(_written(each)))
-        own = (f"{key} = {json.dumps(content[key])}" for key in unlike if key in content)
-        yield f"{each.parent}, {date}: {', '.join(own) or 'computed by another solver'}"[:_WIDEST]
+        own = (f"{k} = {_from(content[k], alike[k])}" for k in unlike if k in content)
+        yield f"{each.parent}, {date}: {', '.join(own) or 'computed by another solver'}"
+
+
+def _alike(texts: list[str]) -> int:
+    """Return how many characters at the beginning of all texts are the same."""
+    return sum(1 for _ in takewhile(lambda own: len({*own}) == 1, zip(*texts, strict=False)))
+
+
+def _from(text: str, alike: int) -> str:
+    """Return the part of a text around what differs, behind so many characters that do not."""
+    begin = 0 if alike < _WIDEST // 2 else alike - _WIDEST // 2
+    return cut(("…" if begin else "") + text[begin:], _WIDEST)
 
 
 def _flat(content: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
