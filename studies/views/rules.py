@@ -36,6 +36,8 @@ FIGURES: Mapping[str, str] = {
     "singular_intensity": "singular intensity",
     "apparent_power": "apparent power",
     "peak_contact_pressure": "peak contact pressure",
+    "wear_depth": "wear depth",
+    "slip_length": "slip length",
     "K_I": "K I {tip} {stage}",
     "K_II": "K II {tip} {stage}",
     "max_plastic_strain": "largest plastic strain",
