@@ -28,7 +28,7 @@ from studies.scenes.shape_tables import LINED, lines_of
 
 _MOST_INCREMENTS = 200_000
 """Largest number of increments of a loading history."""
-_PARTS, _DIVIDED = 63, 80
+_PARTS, _DIVIDED = 63, 40
 """Increments that yielding adds to each, and to all, where they are divided for their error: see
 `solver.loading.integration`. Measured: a roller has 69 in place of 2, a bar that necks 62 in place
 of 40, a mandrel that slides through a hole 364 in place of 120."""

@@ -52,6 +52,10 @@ FIGURES: Mapping[str, str] = {
 and components has a column for the first component of each body, one over tips of cracks and stages
 a column for each."""
 
+PRODUCTS = frozenset({"wear_depth"})
+"""Numbers that are products, not differences of others of their unit: however small beside those,
+they are no rounding."""
+
 EFFORT = (
     "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",
     "blended_tangents", "cpu_seconds", "degrees_of_freedom",
