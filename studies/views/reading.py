@@ -33,6 +33,8 @@ LATEST = "latest"
 _LOG = logging.getLogger("studies")
 _WIDEST = 60
 """Largest number of characters of an entry in which studies differ."""
+_FINISHED = "runs finished"
+"""End of what is told of a study whose runs can be read while it is computed."""
 _WAIT = 60.0
 """Timeout of a request to a service [s]."""
 
@@ -243,7 +245,7 @@ def find_datasets(path: Path | str) -> list[Path]:
     found = present_datasets(path)
     if not found:
         begun = begun_studies(path)
-        if begun:
+        if any(each.partition(";")[0].endswith(_FINISHED) for each in begun):
             there = f"residua view {_output(path)} shows the runs that are there"
             begun += [f"{there}, and gives xarray.open_zarr its address with /studies/ID/zarr"]
         allowed = "; ".join(begun) or "must be a data set, a study or an output directory"
@@ -313,4 +315,4 @@ def _progress(file: Path) -> str:
     if study.kind.chooses:
         return f"{study.name}: the {study.kind.work} has not ended"
     finished = len(store.modified(study.run_ids()))
-    return f"{study.name}: {finished} of {study.size} runs finished"
+    return f"{study.name}: {finished} of {study.size} {_FINISHED}"
