@@ -244,12 +244,15 @@ class GridLost(ConnectionError):
     """The scheduler could not be reached or forgot its tasks; running again computes the rest."""
 
 
-def one_of(name: Any, names: Iterable[str]) -> str:
-    """Return what is allowed in place of `name`: one of `names`, the nearest of them last."""
+def one_of(name: Any, names: Iterable[str], all_of: str = "") -> str:
+    """Return what is allowed in place of `name`: one of `names`, the nearest of them last.
+
+    ``all_of`` tells what lists all, where some are left out.
+    """
     known = list(dict.fromkeys(names))
     listed = ", ".join(cut(each, LONGEST_FIELD) for each in known[:MOST_NAMES])
     more = len(known) - MOST_NAMES
-    listed += f" and {more} more" if more > 0 else ""
+    listed += f" and {more} more{f' ({all_of})' if all_of else ''}" if more > 0 else ""
     return f"must be one of {listed or '(there is none)'}{nearest(name, known)}"
 
 

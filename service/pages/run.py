@@ -14,7 +14,7 @@ from studies.definition.parameters import parameters_of
 from studies.numbers import rounding
 from studies.storage.dataset import attributes_of
 from studies.views.columns import COMPUTED, computed_text, unit_text
-from studies.views.rules import group_of, meter
+from studies.views.rules import PRODUCTS, group_of, meter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +80,8 @@ def numbers_shown(run: Mapping[str, Any], scene: Scene | None) -> list[dict[str,
     for each in sized:
         levels[each["unit"]] = max(levels.get(each["unit"], 0.0), abs(each["value"]))
     for each in sized:
-        if abs(each["value"]) < rounding(each["unit"], levels[each["unit"]]):
+        floor = rounding(each["unit"], levels[each["unit"]])
+        if abs(each["value"]) < floor and each["name"] not in PRODUCTS:
             each["value"] = 0.0
     return sorted(found, key=lambda each: rank(each["name"]))
 

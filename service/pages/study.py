@@ -11,7 +11,7 @@ import numpy as np
 from studies.definition.vocabulary import OK
 from studies.numbers import rounding
 from studies.views.html import number
-from studies.views.rules import FIGURES, group_of
+from studies.views.rules import FIGURES, PRODUCTS, group_of
 from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, varied
 
 ROWS = 25
@@ -80,8 +80,8 @@ def cell_text(column: Column, at: int, floors: Mapping[str, float]) -> str:
     value = column.values[at]
     if column.flags and value == value:
         return str(column.flags.get(int(value), value)).replace("_", " ")
-    if column.number and column.group in NUMBERS and abs(value) < floors.get(column.unit, 0.0):
-        value = 0.0
+    if column.number and column.group in NUMBERS and column.name not in PRODUCTS:
+        value = 0.0 if abs(value) < floors.get(column.unit, 0.0) else value
     return number(value)
 
 

@@ -204,7 +204,7 @@ def read_values(scene: Scene, texts: Mapping[str, str]) -> dict[str, Any]:
     wrong.report()
     for name, text in texts.items():
         if name not in known:
-            raise StudyError(name, text, one_of(name, known))
+            raise StudyError(name, text, one_of(name, known, "residua scenes SCENE lists all"))
     return found | {name: known[name].read(text, name) for name, text in texts.items()}
 
 

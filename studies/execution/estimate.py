@@ -221,7 +221,7 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
             increments += effort.increments
             longest = max(longest, effort.most_increments)
             if effort.seconds is None:
-                more = pace.seconds(effort.unknowns, effort.increments, effort.most_increments)
+                more = pace.seconds(effort)
             else:
                 more = effort.seconds / _TOLD, effort.seconds, effort.seconds * _TOLD
                 basis = f"what passes of {scene.name} took elsewhere"
@@ -384,6 +384,7 @@ class Pace:
     low, high : factors for the 16 % and 84 % quantiles of past runs
     known_at : number of unknowns of the past runs
     basis : on which data it is based, as text
+    elsewhere : whether these are of other scenes, so that `Effort.slow` counts
     """
 
     rate: float
@@ -392,11 +393,13 @@ class Pace:
     high: float
     known_at: float
     basis: str
+    elsewhere: bool = False
 
-    def seconds(self, unknowns: int, least: float, most: float) -> tuple[float, float, float]:
-        """Return low, likely and high seconds of a path of `least` to `most` increments."""
-        size = max(unknowns, _LEAST)
-        one = self.rate * size**self.exponent
+    def seconds(self, effort: Effort) -> tuple[float, float, float]:
+        """Return low, likely and high seconds of the increments of a path."""
+        least, most = effort.increments, effort.most_increments
+        size = max(effort.unknowns, _LEAST)
+        one = self.rate * size**self.exponent * (effort.slow if self.elsewhere else 1.0)
         doubt = math.exp(_DOUBT * abs(math.log(size / self.known_at)))
         likely = one * math.sqrt(least * most)
         return one * least * self.low / doubt, likely, one * most * self.high * doubt
@@ -409,7 +412,7 @@ def pace_of(store: Store, scene: str) -> Pace:
     if len(past) < _ENOUGH:
         rate = _RATE * _AT ** (1 - _EXPONENT)
         basis = f"a pace measured elsewhere: fewer than {_ENOUGH} runs of {scene} are stored here"
-        return Pace(rate, _EXPONENT, 1 / _WIDE, _WIDE, _AT, basis)
+        return Pace(rate, _EXPONENT, 1 / _WIDE, _WIDE, _AT, basis, True)
     basis = f"the pace of the last {len(past)} runs of {scene} stored here"
     unknowns, increments, seconds = past.T
     unknowns = np.maximum(unknowns, _LEAST)

@@ -292,7 +292,10 @@ def _operand(node: ast.expr, values: Mapping[Any, Any]) -> Any:
     value = _value(node, values)
     if _can_compute(value):
         return value
-    raise ExpressionError(f"{_text(node)} is {_shown(value)}: only numbers can be computed with")
+    allowed = "only numbers can be computed with"
+    if isinstance(value, str):
+        allowed += ", and a text without a $ is no expression"
+    raise ExpressionError(f"{_text(node)} is {_shown(value)}: {allowed}")
 
 
 def _can_compute(value: object) -> bool:

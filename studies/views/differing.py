@@ -159,7 +159,7 @@ def diff(first: xr.Dataset, second: xr.Dataset, ignore: Sequence[str] = ()) -> D
         relative = each.absolute / largest[name] if largest[name] else np.inf
         changes[name] = each._replace(relative=relative)
     return Difference(
-        names=(_name(first), _name(second)),
+        names=_names(first, second),
         common=len(both),
         only=only,
         statuses=statuses,
@@ -218,6 +218,12 @@ def _at(values: Mapping[str, Any]) -> str:
 
 def _name(dataset: xr.Dataset) -> str:
     return str(dataset.attrs.get("title", "the study"))
+
+
+def _names(first: xr.Dataset, second: xr.Dataset) -> tuple[str, str]:
+    """Return the names of two studies; which is which too, if they have one name."""
+    one, other = _name(first), _name(second)
+    return (f"{one} (first)", f"{other} (second)") if one == other else (one, other)
 
 
 def _runs(dataset: xr.Dataset) -> Iterator[tuple[dict[str, int], dict[str, Any]]]:

@@ -8,6 +8,7 @@ import logging
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +17,7 @@ import xarray as xr
 
 from studies.definition.identity import is_id
 from studies.definition.study import Study
-from studies.errors import FileDamaged, StudyError
+from studies.errors import FileDamaged, StudyError, cut
 from studies.storage import seal
 from studies.storage.blobs import blobs_at, directory_of, is_address
 from studies.storage.frame import FRACTION
@@ -30,8 +31,10 @@ LATEST = "latest"
 """In the place of a study's name, the study that was computed last."""
 
 _LOG = logging.getLogger("studies")
-_WIDEST = 200
-"""Largest number of characters of the line of a study."""
+_WIDEST = 60
+"""Largest number of characters of an entry in which studies differ."""
+_FINISHED = "runs finished"
+"""End of what is told of a study whose runs can be read while it is computed."""
 _WAIT = 60.0
 """Timeout of a request to a service [s]."""
 
@@ -90,13 +93,25 @@ def find_study(path: Path | str, name: str | None = None) -> Path:
 
 def _listed(found: list[Path]) -> Iterator[str]:
     """Yield a line for each study of one name: its directory, date, and what differs."""
-    contents = [dict(_flat(_content(each))) for each in found]
+    contents = [{k: json.dumps(v) for k, v in _flat(_content(each))} for each in found]
     keys = dict.fromkeys(key for each in contents for key in each)
     unlike = [k for k in keys if any(each.get(k) != contents[0].get(k) for each in contents)]
+    alike = {k: _alike([each[k] for each in contents if k in each]) for k in unlike}
     for each, content in zip(found, contents, strict=True):
         date = time.strftime("%Y-%m-%d %H:%M", time.localtime(_written(each)))
-        own = (f"{key} = {json.dumps(content[key])}" for key in unlike if key in content)
-        yield f"{each.parent}, {date}: {', '.join(own) or 'computed by another solver'}"[:_WIDEST]
+        own = (f"{k} = {_from(content[k], alike[k])}" for k in unlike if k in content)
+        yield f"{each.parent}, {date}: {', '.join(own) or 'computed by another solver'}"
+
+
+def _alike(texts: list[str]) -> int:
+    """Return how many characters at the beginning of all texts are the same."""
+    return sum(1 for _ in takewhile(lambda own: len({*own}) == 1, zip(*texts, strict=False)))
+
+
+def _from(text: str, alike: int) -> str:
+    """Return the part of a text around what differs, behind so many characters that do not."""
+    begin = 0 if alike < _WIDEST // 2 else alike - _WIDEST // 2
+    return cut(("…" if begin else "") + text[begin:], _WIDEST)
 
 
 def _flat(content: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -229,8 +244,11 @@ def find_datasets(path: Path | str) -> list[Path]:
     """
     found = present_datasets(path)
     if not found:
-        begun = "; ".join(begun_studies(path))
-        allowed = begun or "must be a data set, a study or an output directory"
+        begun = begun_studies(path)
+        if any(each.partition(";")[0].endswith(_FINISHED) for each in begun):
+            there = f"residua view {_output(path)} shows the runs that are there"
+            begun += [f"{there}, and gives xarray.open_zarr its address with /studies/ID/zarr"]
+        allowed = "; ".join(begun) or "must be a data set, a study or an output directory"
         raise StudyError("path", str(path), allowed)
     return found
 
@@ -275,6 +293,12 @@ def begun_studies(path: Path | str) -> list[str]:
     return [f"{_progress(file)}; no data set yet ({file.parent})" for file in begun]
 
 
+def _output(path: Path | str) -> Path:
+    """Return the output directory of a study that has a directory there, or else the path."""
+    path = Path(path)
+    return path.parents[1] if path.parent.name == "studies" else path
+
+
 def _progress(file: Path) -> str:
     """Return the name of a study and the number of its finished runs."""
     study, store = None, Store(file.parents[2])
@@ -291,4 +315,4 @@ def _progress(file: Path) -> str:
     if study.kind.chooses:
         return f"{study.name}: the {study.kind.work} has not ended"
     finished = len(store.modified(study.run_ids()))
-    return f"{study.name}: {finished} of {study.size} runs finished"
+    return f"{study.name}: {finished} of {study.size} {_FINISHED}"

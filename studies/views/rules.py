@@ -36,6 +36,8 @@ FIGURES: Mapping[str, str] = {
     "singular_intensity": "singular intensity",
     "apparent_power": "apparent power",
     "peak_contact_pressure": "peak contact pressure",
+    "wear_depth": "wear depth",
+    "slip_length": "slip length",
     "K_I": "K I {tip} {stage}",
     "K_II": "K II {tip} {stage}",
     "max_plastic_strain": "largest plastic strain",
@@ -49,6 +51,10 @@ FIGURES: Mapping[str, str] = {
 """Variables in a table of runs, if the scene has them, and their headings. A variable over bodies
 and components has a column for the first component of each body, one over tips of cracks and stages
 a column for each."""
+
+PRODUCTS = frozenset({"wear_depth"})
+"""Numbers that are products, not differences of others of their unit: however small beside those,
+they are no rounding."""
 
 EFFORT = (
     "increments", "cut_increments", "iterations", "median_iterations", "inner_fallbacks",

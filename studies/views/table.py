@@ -178,7 +178,7 @@ def one_number(name: str, known: Iterable[str], wide: Mapping[str, Sequence[str]
     Those of ``wide`` have more than a number a run: then it tells their dimensions.
     """
     if name not in wide:
-        return one_of(name, known)
+        return one_of(name, known, "residua table lists all")
     over = f"{name} is over {', '.join(wide[name])}"
     return f"{over}: must be a variable with one number a run{nearest(name, known)}"
 

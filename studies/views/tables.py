@@ -38,7 +38,7 @@ from studies.views.columns import (
 from studies.views.elasticities import derived, elasticities
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.reading import open_study
-from studies.views.rules import FIGURES, worst
+from studies.views.rules import FIGURES, PRODUCTS, worst
 from studies.views.summary import NAMED, Failed, Summary, placed, values_text
 
 LISTED = 100
@@ -124,7 +124,7 @@ def _levels(variables: Iterable[xr.DataArray]) -> dict[str, float]:
 
 def _clean(values: xr.DataArray, levels: Mapping[str, float]) -> xr.DataArray:
     """Return numbers with zero for what is rounding beside others of their unit."""
-    if values.dtype.kind != "f" or not (unit := _unit(values)):
+    if values.dtype.kind != "f" or values.name in PRODUCTS or not (unit := _unit(values)):
         return values
     return values.where(~(abs(values) < rounding(unit, levels.get(unit, 0.0))), 0.0)
 

@@ -114,7 +114,9 @@ def test_show_tells_how_far_a_study_without_a_data_set_is(
         assert "first: 3 of 4 runs finished; no data set yet" in told
         assert ("later: 0 of 1 runs finished" in told) is (path == store.directory)
     assert main(["plot", str(store.directory), "--out", str(tmp_path / "a.png")]) == 2
-    assert "first: 3 of 4 runs finished; no data set yet" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "first: 3 of 4 runs finished; no data set yet" in told
+    assert f"residua view {store.directory} shows the runs" in told and "open_zarr" in told
     compute_here(later, store)
     assert main(["show", str(store.directory)]) == 0
     told = capsys.readouterr().out

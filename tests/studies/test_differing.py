@@ -57,6 +57,12 @@ def test_a_study_does_not_differ_from_its_copy(tmp_path: Path) -> None:
     assert difference_table(same) == "4 runs in common\nno value differs"
 
 
+def test_two_studies_of_one_name_are_told_apart(tmp_path: Path) -> None:
+    one = made(tmp_path / "a" / "tour", sweep=SWEEP)
+    other = made(tmp_path / "b" / "tour", sweep={**SWEEP, "friction": [0.0]})
+    assert "only in tour (first)" in difference_table(found(one, other))
+
+
 def test_the_largest_change_is_told_with_its_place(tmp_path: Path) -> None:
     before, after = (made(tmp_path / name, change, sweep=SWEEP) for name, change in (
         ("a", lambda run: run), ("b", doubled),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -110,6 +111,14 @@ def test_own_scenes_take_as_long_as_estimated(tmp_path: Path) -> None:
     found = [timed(*each, tmp_path / str(k)) for k, each in enumerate(drawn(20))]
     outside = [each for each in found if not each.inside]
     assert len(outside) <= 2, outside
+
+
+@pytest.mark.solves
+def test_a_scene_of_large_strain_takes_as_long_as_estimated(tmp_path: Path) -> None:
+    """Its increments cost more, and are divided while the bar yields."""
+    tables = tomllib.loads((ROOT / "data/scenes/neck.toml").read_text())
+    found = timed("neck", tables, tmp_path)
+    assert found.inside, found
 
 
 def test_a_goal_is_estimated_by_the_search_that_is_expected(store: Store) -> None:

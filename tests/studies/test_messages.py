@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from studies.errors import StudyError, without_folders
+from studies.errors import StudyError, one_of, without_folders
 from studies.execution.task import _reason
 
 
@@ -43,3 +43,11 @@ def test_each_of_several_mistakes_is_told_once() -> None:
     mistake = StudyError("friction", 2, "at most 1", [StudyError("load", -1, "positive")])
     assert mistake.listed == ["friction = 2: at most 1", "load = -1: positive"]
     assert str(mistake).splitlines() == mistake.listed
+
+
+def test_a_list_that_is_cut_tells_what_lists_all() -> None:
+    names = [f"n{k}" for k in range(12)]
+    assert one_of("x", names, "residua table lists all").endswith(
+        "n9 and 2 more (residua table lists all)"
+    )
+    assert "residua table" not in one_of("x", names[:9], "residua table lists all")

@@ -56,6 +56,17 @@ def test_two_of_one_name_are_told_with_what_differs(
         assert "hardening" not in line and "seal" not in line
 
 
+def test_of_long_entries_the_part_that_differs_is_told(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    loads = [0.1 + 0.01 * k for k in range(40)]
+    for last in (0.7, 0.8):
+        compute_here(fake_study("tour", {"load_ratio": [*loads, last]}), store)
+    open_study(store.directory, "tour").close()
+    (told,) = [text for text in caplog.messages if "of this name" in text]
+    assert [line.rpartition(" ")[2] for line in told.splitlines()[1:]] == ["0.8]", "0.7]"]
+
+
 def test_a_study_in_a_directory_is_named_in_its_path(store: Store) -> None:
     tour, other = fake_study("tour"), fake_study("other", {"friction": [0.2]})
     for age, study in ((30, tour), (10, other)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -47,6 +49,16 @@ def test_rounding_beside_numbers_of_its_unit_is_zero() -> None:
     assert "4.6e-11" not in study(moved=[350.0, 4.6e-11])
     assert "4.6e-11" not in study(moved=[350.0, 350.0], other=[4.6e-11, 2.0])
     assert "4.6e-11" in study(moved=[4.6e-11, 1e-11])
+
+
+def test_wear_has_its_columns() -> None:
+    """Wear is no rounding, however small it is beside other lengths."""
+    numbers = {"wear_depth": (1e-11, "mm"), "slip_length": (0.02, "mm")}
+    held: dict[str, Any] = {
+        name: ("load_ratio", [each], {"units": unit}) for name, (each, unit) in numbers.items()
+    }
+    told = runs_table(xr.Dataset({"status": ("load_ratio", ["ok"]), **held}, {"load_ratio": [1.0]}))
+    assert told.split()[-3:] == ["ok", "1e-11", "0.02"] and "wear" in told and "slip" in told
 
 
 def test_a_shakedown_state_is_told_by_its_word() -> None:

@@ -10,9 +10,12 @@ from typing import Any
 import xarray as xr
 
 from solver.errors import ModelError
+from solver.materials.library import library
+from solver.materials.library import named as named_material
 from solver.parameters import unmet
 from solver.tensors import AXES
 from studies.definition.parameters import build, defaults, parameters_of, plain
+from studies.materials import MATERIAL
 from studies.numbers import number_text
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION
@@ -21,6 +24,8 @@ from studies.views.columns import plain as in_words
 from studies.views.picking import flags
 
 _STAY = "\N{NO-BREAK SPACE}"
+_STRENGTH = "yield_stress"
+"""The parameter that says which steel it is."""
 
 
 def words(identifier: str) -> str:
@@ -100,14 +105,17 @@ def setting(run: xr.Dataset) -> str:
     """Return the scene and what distinguishes this run from others, in words.
 
     These are its values on the axes of the sweep, and the parameters that differ from the scene's
-    defaults. The two-dimensional state is always named.
+    defaults. The two-dimensional state and the yield stress are always named. A material of the
+    library stands for its parameters.
     """
     scene = run.attrs["scene"]
     known = parameters_of(scene_of(run.attrs))
     given: Mapping[str, Any] = json.loads(run.attrs["parameters"])
     usual = _usual(run, given)
     own = {name: computed_text(value, _computed(run, name)) for name, value in given.items()}
-    idle = _idle(run, given)
+    values = _values(run, given)
+    idle, material = _idle(run, values), _material(values)
+    made = {*named_material(material)} if material else set()
     plane = given.get("state")
     state = [words(plane)] if isinstance(plane, str) and "state" not in run.coords else []
     place = [
@@ -119,14 +127,16 @@ def setting(run: xr.Dataset) -> str:
             each.attrs.get("units", ""),
         )
         for name, each in run.coords.items()
-        if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle
+        if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle | made
     ]
+    if material and MATERIAL not in run.coords:
+        place.append(named(MATERIAL, material))
     others = [
         named(name, own[name], known[name].unit)
         for name, value in given.items()
         if name in known
-        and name not in {*run.coords, *idle}
-        and value not in (None, usual[name])
+        and name not in {*run.coords, *idle, *made}
+        and (value not in (None, usual[name]) or name == _STRENGTH)
         and not (state and name == "state")
     ]
     parts = [scene, *state, *place, *others]
@@ -139,22 +149,33 @@ def _computed(run: xr.Dataset, name: str) -> str:
     return "" if variable is None or variable.ndim else flags(variable).get(variable.item(), "")
 
 
-def _idle(run: xr.Dataset, given: Mapping[str, Any]) -> set[str]:
+def _values(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of parameters of a run."""
+    known = parameters_of(scene_of(run.attrs))
+    own = {str(name): each.item() for name, each in run.coords.items() if each.ndim == 0}
+    values = {name: value for name, value in {**given, **own}.items() if name in known}
+    return {name: plain(value, known[name].default) for name, value in values.items()}
+
+
+def _material(values: Mapping[str, Any]) -> str:
+    """Return the material of the library that has these parameters; else an empty text."""
+    each = ((name, named_material(name).items()) for name in library())
+    return next((name for name, own in each if all(values.get(k) == v for k, v in own)), "")
+
+
+def _idle(run: xr.Dataset, values: Mapping[str, Any]) -> set[str]:
     """Return the parameters that change nothing in a run, such as a load ratio beside a force.
 
     Those that every pass of a sequence has for itself do not either.
     """
     scene = scene_of(run.attrs)
-    own = {str(name): each.item() for name, each in run.coords.items() if each.ndim == 0}
-    known = parameters_of(scene)
-    values = {name: value for name, value in {**given, **own}.items() if name in known}
     try:
-        parameters = build(scene, {k: plain(v, known[k].default) for k, v in values.items()})
+        parameters = build(scene, values)
     except ModelError:  # consistent only with values that differ between the runs
         return set()
     passes = [set(own) for own in getattr(parameters, "sequence", ())]
     each = set.intersection(*passes) if passes else set()
-    return each | {name for name in known if unmet(parameters, name)}
+    return each | {name for name in parameters_of(scene) if unmet(parameters, name)}
 
 
 def _usual(run: xr.Dataset, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -59,7 +59,12 @@ _SHARES = (0.3, 0.7, 0.15, 0.85)
 _SMALLEST = 1e-6
 """Least side of a part, over the largest coordinate of what there is."""
 _AROUND = 25.0
-"""Half the width of a close-up without a map, over the shortest side of an element."""
+"""Half the width of a close-up without a map, over the least side of elements there."""
+_ALIKE = 1.1
+"""Largest ratio of lengths of edges that count as equally short."""
+_NEAR = 0.35
+"""How far a rigid surface or a curve is seen beyond the bodies, over their size; one that is no
+larger than they are is seen as far as their size."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -193,12 +198,14 @@ def _shown(scene: Scene, parameters: Any, view: View) -> _Subject:
 def _extent(shown: _Subject) -> Box:
     """Return the box around all bodies; of rigid bodies and curves only what is near."""
     p = np.hstack([body.mesh.p for body in shown.own.bodies])
-    low, high = p.min(axis=1), p.max(axis=1)
-    near = 0.35 * float(np.max(high - low))
+    first, last = low, high = p.min(axis=1), p.max(axis=1)
+    size = float(np.max(last - first))
     others = [s.points for body in shown.rigid for s in body.surfaces.values()]
     for each in (*others, *shown.own.curves.values()):
-        low = np.minimum(low, np.maximum(np.asarray(each).min(axis=1), low - near))
-        high = np.maximum(high, np.minimum(np.asarray(each).max(axis=1), high + near))
+        start, end = np.asarray(each).min(axis=1), np.asarray(each).max(axis=1)
+        near = size if np.max(end - start) <= size else _NEAR * size
+        low = np.minimum(low, np.maximum(start, first - near))
+        high = np.maximum(high, np.minimum(end, last + near))
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
@@ -212,15 +219,14 @@ def _around(box: Box) -> Box:
 
 
 def _close(shown: _Subject, view: View) -> Box | None:
-    """Return a box around the map, or else around the smallest elements."""
+    """Return a box around the map, or else where the surfaces in contact are meshed finest."""
     across, up = view.map_grid
     if across.size and up.size:
         low, high = (float(across.min()), float(up.min())), (float(across.max()), float(up.max()))
         return _around((low[0], high[0], low[1], high[1]))
     if not shown.own.pairs:
         return None
-    sides = [(_shortest(body.mesh), body) for body in shown.own.bodies]
-    (side, (x, y)), _ = min(sides, key=lambda each: each[0][0])
+    side, (x, y) = _finest(shown.own)
     reach = _AROUND * side
     left, right, bottom, top = _extent(shown)
     more = 2 * _MARGIN * reach
@@ -230,13 +236,28 @@ def _close(shown: _Subject, view: View) -> Box | None:
     )  # fmt: skip
 
 
-def _shortest(mesh: Mesh) -> tuple[float, tuple[float, float]]:
-    """Return length and middle of the shortest edge [mm]."""
+def _finest(own: Sketch) -> tuple[float, Array]:
+    """Return where surfaces in contact have their shortest edges, and the least side there [mm].
+
+    Of edges as short, all along a fillet for example, it is the one nearest to their middle. The
+    side is that of the elements at these edges.
+    """
+    bodies = {body.name: body for body in own.bodies}
+    meshed = {side: bodies[side[0]] for pair in own.pairs for side in pair if side[0] in bodies}
+    found = [_edges(body.mesh, body.facets(name)) for (_, name), body in meshed.items()]
+    middles, length, least = (np.concatenate(each, axis=-1) for each in zip(*found, strict=True))
+    short = length <= _ALIKE * length.min()
+    middles = middles[:, short]
+    away = np.linalg.norm(middles - middles.mean(axis=1, keepdims=True), axis=0)
+    return float(least[short].min()), middles[:, int(away.argmin())]
+
+
+def _edges(mesh: Mesh, facets: Array) -> tuple[Array, Array, Array]:
+    """Return middles (2, n) and lengths of edges, and the least side of each element there [mm]."""
     ends = mesh.p[:, mesh.facets]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=0)
-    k = int(length.argmin())
-    x, y = ends[:, :, k].mean(axis=1)
-    return float(length[k]), (float(x), float(y))
+    least = length[mesh.t2f[:, mesh.f2t[0, facets]]].min(axis=0)
+    return ends[:, :, facets].mean(axis=1), length[facets], least
 
 
 def _check_part(name: str, value: Any, box: Box, whole: Box, shown: _Subject) -> None:
@@ -400,7 +421,8 @@ def _label(
     """Write the name of a line, given by the ends of its pieces (2, n, 2), inside its body.
 
     It stands at the middle of the part of the line that is seen, unless that is too short. Where it
-    would stand on other names, whose boxes are ``taken``, it is moved along the line, or across it.
+    would stand on other names, whose boxes are ``taken``, or beyond the axes, it is moved along the
+    line, or across it.
     Names of a thin body stand outside of it.
     """
     middle, along = ends.mean(axis=2), ends[:, :, 1] - ends[:, :, 0]
@@ -420,7 +442,8 @@ def _label(
             left = side * np.array([-way[1, k], way[0, k]]) / length[k]
             ha = "center" if abs(left[0]) < 0.5 else "left" if left[0] > 0 else "right"
             box = _box_of(name, here[:, k] + _OFF * inch * left, ha, inch)
-            covered = sum(_shared(box, each) for each in taken)
+            beyond = (box[1] - box[0]) * (box[3] - box[2]) - _shared(box, (x0, x1, y0, y1))
+            covered = beyond + sum(_shared(box, each) for each in taken)
             if best is None or covered < best[0]:
                 best = covered, k, left, ha, box
     assert best is not None

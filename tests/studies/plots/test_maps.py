@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from matplotlib.text import Text
 
+from solver.materials.library import named
 from solver.shipped import SCENES
 from studies import Store, Study, StudyError, open_netcdf, open_study
+from studies.definition.parameters import parameters_of
 from studies.views.plots.captions import setting
 from studies.views.plots.lines import line_figure
 from studies.views.plots.mapped import whole
@@ -524,6 +527,19 @@ def test_a_caption_leaves_out_what_changes_nothing() -> None:
     )
     words = setting(run).replace("\N{NO-BREAK SPACE}", " ")
     assert "force 8000" in words and "load ratio" not in words
+
+
+def test_a_caption_names_the_steel_also_if_it_is_the_usual_one() -> None:
+    def told(**values: Any) -> str:
+        run = xr.Dataset(attrs={"scene": "punch", "parameters": json.dumps(values)})
+        return setting(run).replace("\N{NO-BREAK SPACE}", " ")
+
+    usual = parameters_of(SCENES["punch"])["yield_stress"].default
+    assert told(yield_stress=usual).endswith(f"yield stress {usual:g} MPa")
+    steel = named("rail-steel")
+    assert told(**steel) == "punch · material rail-steel"
+    other = told(**{**steel, "yield_stress": 480.0})
+    assert "yield stress 480 MPa" in other and "rail-steel" not in other
 
 
 def test_a_caption_leaves_out_the_load_of_a_run_whose_passes_have_their_own() -> None:

@@ -255,3 +255,31 @@ def test_each_link_line_and_point_differs_in_the_legend() -> None:
             if isinstance(line, Line2D) and text.get_text().startswith(("link", "springs", "line "))
         ]
         assert len(looks) > 1 and len({*looks}) == len(looks)
+
+
+def test_without_a_map_the_close_up_is_where_surfaces_in_contact_are_meshed_finest(
+    tmp_path: Path,
+) -> None:
+    """Not at an end of the other surfaces, whose elements are as short across."""
+    shape = SCENE[SCENE.index("kind = ") : SCENE.index("[rigid.ball]")]
+    near = "near = [{ at = [10.4, 0.4], size = 0.05, radius = 0.3 }]"
+    fillet = (
+        'kind = "fillet"\nwide = 15\nnarrow = 10\nradius = 1.5\nlengths = [8, 10]\nsize = 1.0\n'
+        f"{near}\n"
+    )
+    text = SCENE.replace(shape, fillet).replace("centre = [0, 12]", "centre = [11.288, 1.288]")
+    text = text.replace("radius = 10\nangles = [-90, -80]", "radius = 1.2\nangles = [180, 270]")
+    text = text.replace("block.top", "block.fillet").partition("[results.lines")[0]
+    (tmp_path / "block.toml").write_text(text)
+    _, close = setup_figure(beside(tmp_path)("block.toml")).axes
+    assert close.viewLim.contains(10.44, 0.44), "the middle of the fillet"
+    assert close.get_xlim()[1] < 12.5
+
+
+def test_a_tool_no_larger_than_the_bodies_is_seen_whole_and_its_name_within_the_axes() -> None:
+    (axes,) = setup_figure(scene_named("mandrel.toml", beside(DATA))).axes
+    axes.figure.draw_without_rendering()
+    (arrow,) = (each for each in axes.collections if isinstance(each, Quiver))
+    assert axes.viewLim.contains(*arrow.XY[0]) and axes.get_ylim()[0] < -7.0
+    (name,) = (each for each in axes.texts if each.get_text() == "mandrel.face")
+    assert axes.get_window_extent().contains(*name.get_window_extent().min)

@@ -73,7 +73,7 @@ def test_an_expression_has_the_value_of_arithmetic(text: str, value: object) -> 
         ("($a, 2)", r"\(\$a, 2\) cannot be read"),
         ("sqrt(*$a)", "cannot be read"),
         ("2*parameter__a+$a", "from 'parameter__a"),
-        ("$rule * 2", "only numbers"),
+        ("$rule * 2", "no expression"),
         ("$on + 1", "only numbers"),
         ("$rule < 'n'", "cannot compare 'mixed' and 'n'"),
         ("$rule == 2", "cannot compare 'mixed' and 2"),
