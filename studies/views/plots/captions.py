@@ -136,7 +136,8 @@ def setting(run: xr.Dataset) -> str:
         for name, value in given.items()
         if name in known
         and name not in {*run.coords, *idle, *made}
-        and (value not in (None, usual[name]) or name == _STRENGTH)
+        and value is not None
+        and (value != usual[name] or name == _STRENGTH)
         and not (state and name == "state")
     ]
     parts = [scene, *state, *place, *others]

@@ -536,6 +536,7 @@ def test_a_caption_names_the_steel_also_if_it_is_the_usual_one() -> None:
 
     usual = parameters_of(SCENES["punch"])["yield_stress"].default
     assert told(yield_stress=usual).endswith(f"yield stress {usual:g} MPa")
+    assert told(yield_stress=None) == "punch"
     steel = named("rail-steel")
     assert told(**steel) == "punch · material rail-steel"
     other = told(**{**steel, "yield_stress": 480.0})
