@@ -13,10 +13,10 @@ from studies.scenes.scene import read_scene
 FILE = Path(__file__).parents[2] / "data/scenes/fillet.toml"
 
 
-@pytest.fixture(scope="module")
-def record() -> Record:
+@pytest.fixture(scope="module", params=["small", "large"])
+def record(request: pytest.FixtureRequest) -> Record:
     scene = read_scene(FILE)
-    (found,) = scene.path(scene.parameters(), [], lambda share: None)
+    (found,) = scene.path(scene.parameters(strain=request.param), [], lambda share: None)
     return found
 
 
