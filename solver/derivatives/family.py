@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
+from solver.audit.figures import AUDIT
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.derivatives.asked import Derivatives, named, reach
 from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
+from solver.loading.outcome import IncrementFailed
 from solver.loading.program import Program
 from solver.results.acting import acting_on
 from solver.results.fields import Samples
 from solver.results.quantities import QUANTITIES
 from solver.results.run import FinishedRun, Output, Values
+from solver.typing import Array
 
 _JUMP = 1e-3
 """Change of a number over the number, above which it jumps, as the place of a maximum that two
@@ -115,31 +119,88 @@ class Family:
     def values(
         self, watched: Sequence[Sequence[Any]], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the derivatives of results of a run, given its outputs, and their ranges.
+        """Return the derivatives of results of a run, given its outputs, their ranges and audit.
 
         They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
         a line or a map they are those at places of equal number, which may move: the derivatives of
         its coordinates say how.
         """
-        steps, found = self._steps(run.parameters), dict[str, Any]()
-        shares = {by: abs(step / getattr(run.parameters, by)) for by, step in steps.items()}
+        found: dict[str, Any] = {q.name: np.nan for q in self._declared if not q.dims}
         runs = self.finished(run, watched)
-        for (by, share), other in zip(shares.items(), runs[1:], strict=False):
+        outputs = [_coordinates, *outputs] if runs else []
+        outputs = [each for each in outputs if self._wanted(runs[0], [each])]
+        steps = self._steps(run.parameters)
+        if runs:
+            first = self._wanted(runs[0], outputs)
+        for (by, step), other in zip(steps.items(), runs[1:], strict=False):
+            share = abs(step / getattr(run.parameters, by))
             found[reach(by)] = min(share * other.outcome.last.near, 1.0)
-        for output in (_coordinates, *outputs) if runs else ():
-            first = _numbers(output(runs[0]))
-            wanted = [name for name in self._asked.of if name in first]
-            if not wanted:
-                continue
-            for (by, step), other in zip(steps.items(), runs[1:], strict=True):
-                after = _numbers(output(other))
-                for of in wanted:
-                    level, values = np.abs(first[of]), np.asarray(after.get(of, np.nan))
-                    most = _JUMP * np.nan_to_num(level).max(initial=0.0)
-                    change = values - first[of]
-                    found[named(of, by)] = np.where(np.abs(change) > most, np.nan, change / step)
-        lacks = {q.name: np.nan for q in self._declared if not q.dims}
-        return {q: (lacks | found)[q.name] for q in self._declared if q.name in lacks | found}
+            slopes = _slopes(first, self._wanted(other, outputs), step)
+            found |= {named(of, by): slope for of, slope in slopes.items()}
+        audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}
+        return {**audit, **{q: found[q.name] for q in self._declared if q.name in found}}
+
+    def _wanted(self, run: FinishedRun, outputs: Iterable[Output]) -> dict[str, Any]:
+        """Return the results of a run that are to be derived, of some outputs."""
+        each = (output(run).items() for output in outputs)
+        found = {q.name: value for values in each for q, value in values}
+        return {name: found[name] for name in self._asked.of if name in found}
+
+    def _audit(
+        self, run: FinishedRun, runs: Sequence[FinishedRun], outputs: Iterable[Output], found: Any
+    ) -> Values:
+        """Return the error of the derivatives by one parameter in one increment.
+
+        An increment that ends a stage is solved again (`NeighbouringRuns.alone`): the first on
+        which a result depends, from a stage on that the parameters of the run decide, as they
+        decide by which parameter.
+        """
+        chance = crc32(repr(run.parameters).encode())
+        by, step = list(self._steps(run.parameters).items())[chance % (len(runs) - 1)]
+        both = runs[0], runs[1 + chance % (len(runs) - 1)]
+        points = runs[0].outcome.points
+        stages = [name for name, own in points.items() if own.start is not own.state]
+        at, value = chance % max(len(stages), 1), getattr(run.parameters, by)
+        for stage in stages[at:] + stages[:at]:
+            try:
+                alone = [self._alone(runs.index(own), own, run, stage) for own in both]
+            except IncrementFailed:
+                return {AUDIT["audit_derivatives"]: np.nan}
+            first, after = (self._wanted(own, outputs) for own in alone)
+            errors = [0.0]
+            for of, slope in _slopes(first, after, step).items():
+                own = found[named(of, by)]
+                level = max(_largest(np.divide(first[of], value)), _largest(own)) or 1.0
+                errors.append(_largest(slope - own) / level)
+            if max(errors) > 0:
+                break
+        return {AUDIT["audit_derivatives"]: max(errors)}
+
+    def _alone(self, k: int, own: FinishedRun, run: FinishedRun, stage: str) -> FinishedRun:
+        """Return a neighbour whose increment at the end of a stage is solved again."""
+        before = own.outcome.points[stage]
+        after = self.followers.alone(k, before, run.outcome.points[stage])
+        work = own.outcome.tally.plastic_work + after.plastic_work - before.plastic_work
+        points = {name: after if c is before else c for name, c in own.outcome.points.items()}
+        last = after if own.outcome.last is before else own.outcome.last
+        tally = replace(own.outcome.tally, plastic_work=work)
+        outcome = replace(own.outcome, points=points, last=last, tally=tally)
+        return replace(own, outcome=outcome, kept={})
+
+
+def _slopes(first: Mapping[str, Any], after: Mapping[str, Any], step: float) -> dict[str, Array]:
+    """Return the derivatives of results, given those of the run and those after a step."""
+    found: dict[str, Array] = {}
+    for of, value in first.items():
+        change = np.asarray(after.get(of, np.nan)) - value
+        most = _JUMP * _largest(value)
+        found[of] = np.where(np.abs(change) > most, np.nan, change / step)
+    return found
+
+
+def _largest(values: Any) -> float:
+    """Return the largest absolute value, 0 if there is none."""
+    return float(np.abs(np.nan_to_num(values)).max(initial=0.0))
 
 
 def _coordinates(run: FinishedRun) -> Values:
@@ -147,7 +208,3 @@ def _coordinates(run: FinishedRun) -> Values:
     each = {name: np.asarray(values) for name, values in run.view.coordinates.items()}
     numbers = {name: values for name, values in each.items() if values.dtype.kind == "f"}
     return {QUANTITIES[name]: values for name, values in numbers.items() if name in QUANTITIES}
-
-
-def _numbers(values: Values) -> dict[str, Any]:
-    return {quantity.name: value for quantity, value in values.items()}

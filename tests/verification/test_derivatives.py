@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -25,9 +26,12 @@ from solver import (
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.derivatives.asked import STEP, Derivatives
+from solver.loading.increment import Increment
+from solver.loading.step import newton_step
 from solver.loading.walker import Walker
 from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, TrescaMaterial, Voce
 from solver.mesh import grid
+from solver.results.record import Status
 from solver.scenes import Scene
 from solver.shipped import SCENES
 from studies.scenes.registry import scene_named
@@ -339,3 +343,46 @@ def test_a_number_that_changes_the_elements_is_refused() -> None:
 
     with pytest.raises(ModelError, match=r"size = 'the elements of plate': must not change"):
         derive(plate, {"size": 1.0}, lambda solution: 0.0)
+
+
+def elastic_step(self: Increment, end: Converged, operators: Any) -> Any:
+    """Return the increment after one step with the elastic stiffness, whatever forces are left."""
+    with mock.patch("solver.loading.increment._small", lambda *sizes: True):
+        return LINEARISED(self, end, [each.elastic for each in self.system.operators])
+
+
+def long_step(self: Increment, end: Converged, operators: Any) -> Any:
+    """Return the increment after one step that is a hundredth too long."""
+
+    def long(*given: Any) -> Any:
+        step = newton_step(*given)
+        return step and replace(step, u=tuple(1.01 * u for u in step.u))
+
+    with (
+        mock.patch("solver.loading.increment._small", lambda *sizes: True),
+        mock.patch("solver.loading.increment.newton_step", long),
+    ):
+        return LINEARISED(self, end, operators)
+
+
+LINEARISED = Increment.linearised
+
+
+@pytest.mark.parametrize("fault", [elastic_step, long_step])
+def test_the_audit_finds_a_fault_in_the_step_of_a_neighbour(
+    fault: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One increment of each run is solved again: in some of the runs the fault is in it."""
+    scene, given = SCENES["punch"], {"accuracy": "draft", "load_ratio": 0.7}
+    punches = [scene.parameters(**given, friction=friction) for friction in (0.12, 0.14, 0.16)]
+    asked = ("friction", "yield_stress"), ("peak_residual_tension", "plastic_work")
+    right = [numbers(scene, each, *asked) for each in punches]
+    assert max(each.scalars["audit_derivatives"] for each in right) < 2e-5
+    assert {each.message for each in right} == {""}
+    monkeypatch.setattr(Increment, "linearised", fault)
+    wrong = [numbers(scene, each, *asked) for each in punches]
+    assert {Status.AUDIT_FAILED} <= {each.status for each in wrong}
+    for each in wrong:
+        off = each.scalars["audit_derivatives"]
+        assert (each.status is Status.AUDIT_FAILED) == (off > 3e-4)
+        assert (f"audit_derivatives = {off:.2e} exceeds" in each.message) == (off > 3e-4)
