@@ -14,8 +14,7 @@ from solver.errors import ModelError
 from solver.results.quantities import Quantity
 
 STEP = -1e-6
-"""Difference of a parameter of a neighbouring run over its value. It is negative: a load slightly
-above a whole number of increments would need one more."""
+"""Difference of a parameter of a neighbouring run over its value."""
 
 _WIDER = 10.0
 """The same of a parameter that moves nodes, over `STEP`: positions are known up to rounding, and

@@ -386,3 +386,13 @@ def test_the_audit_finds_a_fault_in_the_step_of_a_neighbour(
         off = each.scalars["audit_derivatives"]
         assert (each.status is Status.AUDIT_FAILED) == (off > 3e-4)
         assert (f"audit_derivatives = {off:.2e} exceeds" in each.message) == (off > 3e-4)
+
+
+def test_runs_at_and_off_a_whole_number_of_increments_have_derivatives_by_load_and_step() -> None:
+    scene, by = SCENES["punch"], ("load_ratio", "load_step")
+    parameters = scene.parameters(accuracy="draft", friction=0.1, hardening="isotropic")
+    asked = replace(scene, derivatives=Derivatives(by=by, of=("plastic_work",)))
+    for record in asked.path(parameters, [0.3, 0.55], lambda share: None):
+        assert record.message == ""
+        assert record.scalars["d_plastic_work_d_load_ratio"] > 0
+        assert np.isfinite(record.scalars["d_plastic_work_d_load_step"])
