@@ -35,9 +35,8 @@ class Family:
     Parameters
     ----------
     asked : the derivatives
-    scene : the scene, with ``model``, ``program`` and ``view``
+    scene : the scene
     run : parameters of the last run of the path
-    system, samples : those of the run
 
     Raises
     ------
@@ -45,12 +44,73 @@ class Family:
         naming a parameter by which no derivative exists
     """
 
+    def __init__(self, asked: Derivatives, scene: Any, run: Any) -> None:
+        self._asked, self._scene, self._moving = asked, scene, set[str]()
+        self._declared = asked.quantities(type(run), scene.known_quantities)
+
+    def runs(self, run: Any) -> list[Any]:
+        """Return the parameters of the neighbours of a run."""
+        steps = self.steps(run)
+        return [replace(run, **{name: getattr(run, name) + steps[name]}) for name in steps]
+
+    def steps(self, run: Any) -> dict[str, float]:
+        """Return the difference of each parameter by which a run is derived."""
+        return self._asked.steps(run, self._moving)
+
+    def values(
+        self, runs: Sequence[FinishedRun], run: FinishedRun, outputs: Iterable[Output]
+    ) -> Values:
+        """Return the derivatives of results of a run, given its outputs, their ranges and audit.
+
+        They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
+        a line or a map they are those at places of equal number, which may move: the derivatives of
+        its coordinates say how.
+
+        Parameters
+        ----------
+        runs : the run as a neighbour of itself, then the others; none if one failed
+        """
+        found: dict[str, Any] = {q.name: np.nan for q in self._declared if not q.dims}
+        outputs = [_coordinates, *outputs] if runs else []
+        outputs = [each for each in outputs if self._wanted(runs[0], [each])]
+        steps = self.steps(run.parameters)
+        if runs:
+            first = self._wanted(runs[0], outputs)
+        for (by, step), other in zip(steps.items(), runs[1:], strict=False):
+            share = abs(step / getattr(run.parameters, by))
+            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
+            slopes = _slopes(first, self._wanted(other, outputs), step)
+            found |= {named(of, by): slope for of, slope in slopes.items()}
+        audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}
+        return {**audit, **{q: found[q.name] for q in self._declared if q.name in found}}
+
+    def _wanted(self, run: FinishedRun, outputs: Iterable[Output]) -> dict[str, Any]:
+        """Return the results of a run that are to be derived, of some outputs."""
+        each = (output(run).items() for output in outputs)
+        found = {q.name: value for values in each for q, value in values}
+        return {name: found[name] for name in self._asked.of if name in found}
+
+    def _audit(
+        self, run: FinishedRun, runs: Sequence[FinishedRun], outputs: Iterable[Output], found: Any
+    ) -> Values:
+        """Return the audit of the derivatives ``found``, if there is one."""
+        return {}
+
+
+class IncrementalFamily(Family):
+    """The neighbouring runs of a path by increments.
+
+    Parameters
+    ----------
+    asked, scene, run : as of a `Family`; the scene has ``model``, ``program`` and ``view``
+    system, samples : those of the run
+    """
+
     def __init__(
         self, asked: Derivatives, scene: Any, run: Any, system: System, samples: Samples
     ) -> None:
-        self._asked, self._scene, self._moving = asked, scene, set[str]()
-        self._declared = asked.quantities(type(run), scene.known_quantities)
-        models = dict(zip(self._steps(run), map(scene.model, self.runs(run)), strict=True))
+        super().__init__(asked, scene, run)
+        models = dict(zip(self.steps(run), map(scene.model, self.runs(run)), strict=True))
         for name, model in models.items():
             both = zip(system.model.bodies, model.bodies, strict=True)
             if not all(np.array_equal(one.mesh.p, two.mesh.p) for one, two in both):
@@ -68,19 +128,11 @@ class Family:
             for each, own in zip((system, *systems.values()), self._beside, strict=True)
         ]
 
-    def runs(self, run: Any) -> list[Any]:
-        """Return the parameters of the neighbours of a run."""
-        steps = self._steps(run)
-        return [replace(run, **{name: getattr(run, name) + steps[name]}) for name in steps]
-
-    def _steps(self, run: Any) -> dict[str, float]:
-        return self._asked.steps(run, self._moving)
-
     def program(self, run: Any) -> Program:
         """Return the program of a run, with those of its neighbours beside it."""
         beside = tuple(self._scene.program(each) for each in self.runs(run))
         own: Program = self._scene.program(run)
-        for name, other in zip(self._steps(run), beside, strict=True):
+        for name, other in zip(self.steps(run), beside, strict=True):
             if len(other.targets) != len(own.targets):
                 allowed = "must not change the number of increments: derivatives are taken by it"
                 raise ModelError(name, getattr(run, name), allowed)
@@ -116,35 +168,11 @@ class Family:
             for k, (outcome, parameters, samples, acting) in enumerate(each, 1)
         ]
 
-    def values(
+    def derived(
         self, watched: Sequence[Sequence[Any]], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the derivatives of results of a run, given its outputs, their ranges and audit.
-
-        They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
-        a line or a map they are those at places of equal number, which may move: the derivatives of
-        its coordinates say how.
-        """
-        found: dict[str, Any] = {q.name: np.nan for q in self._declared if not q.dims}
-        runs = self.finished(run, watched)
-        outputs = [_coordinates, *outputs] if runs else []
-        outputs = [each for each in outputs if self._wanted(runs[0], [each])]
-        steps = self._steps(run.parameters)
-        if runs:
-            first = self._wanted(runs[0], outputs)
-        for (by, step), other in zip(steps.items(), runs[1:], strict=False):
-            share = abs(step / getattr(run.parameters, by))
-            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
-            slopes = _slopes(first, self._wanted(other, outputs), step)
-            found |= {named(of, by): slope for of, slope in slopes.items()}
-        audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}
-        return {**audit, **{q: found[q.name] for q in self._declared if q.name in found}}
-
-    def _wanted(self, run: FinishedRun, outputs: Iterable[Output]) -> dict[str, Any]:
-        """Return the results of a run that are to be derived, of some outputs."""
-        each = (output(run).items() for output in outputs)
-        found = {q.name: value for values in each for q, value in values}
-        return {name: found[name] for name in self._asked.of if name in found}
+        """Return the `values` of a run; ``watched`` are those of `watched` for each increment."""
+        return self.values(self.finished(run, watched), run, outputs)
 
     def _audit(
         self, run: FinishedRun, runs: Sequence[FinishedRun], outputs: Iterable[Output], found: Any
@@ -156,7 +184,7 @@ class Family:
         decide by which parameter.
         """
         chance = crc32(repr(run.parameters).encode())
-        by, step = list(self._steps(run.parameters).items())[chance % (len(runs) - 1)]
+        by, step = list(self.steps(run.parameters).items())[chance % (len(runs) - 1)]
         both = runs[0], runs[1 + chance % (len(runs) - 1)]
         points = runs[0].outcome.points
         stages = [name for name, own in points.items() if own.start is not own.state]

@@ -27,7 +27,7 @@ from solver.results.run import FinishedRun, Output, Values
 from solver.results.singularity import singular_points
 from solver.scenes.scene import Monitor, Scene
 
-_Family = Late("solver.derivatives.family:Family")
+_Family = Late("solver.derivatives.family:IncrementalFamily")
 
 
 def record(scene: Scene, run: FinishedRun) -> Record:
@@ -142,7 +142,7 @@ def by_increments(
     for walked_to, run in zip(walker.walk(programs, bound), runs, strict=True):
         outcome, derived = walked_to, None
         if family:
-            derived = partial(family.values, outcome.history)
+            derived = partial(family.derived, outcome.history)
             outcome = replace(outcome, history=tuple(own[0] for own in outcome.history))
 
         def check(outcome: Outcome = outcome) -> Audit:
