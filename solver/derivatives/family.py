@@ -193,7 +193,7 @@ class IncrementalFamily(Family):
             try:
                 alone = [self._alone(runs.index(own), own, run, stage) for own in both]
             except IncrementFailed:
-                return {AUDIT["audit_derivatives"]: np.nan}
+                return {}
             first, after = (self._wanted(own, outputs) for own in alone)
             errors = [0.0]
             for of, slope in _slopes(first, after, step).items():

@@ -43,7 +43,7 @@ from solver.loading.program import Control, Tolerances
 from solver.loading.stepper import Stepper, Way, placed
 from solver.typing import Array, Ints
 
-_TIGHT = Tolerances(residual=1e-11, contact=1e-10)
+_TIGHT = Tolerances(residual=1e-13, contact=1e-12)
 """Of an increment of which differences of 1e-6 are taken."""
 
 

@@ -69,7 +69,7 @@ _LESS = 0.8
 line search. Close to a limit load the energy rises along many steps that approach the solution."""
 _SHORTEST = 1e-3
 """Least share of a step to which it is shortened until its forces are finite."""
-_CORRECTIONS, _BALANCED, _CORRECTED, _NEGLIGIBLE, _SLOW = 12, 1e-6, 1e-6, 1e-12, 0.1
+_CORRECTIONS, _BALANCED, _CORRECTED, _NEGLIGIBLE, _SLOW = 12, 1e-6, 1e-6, 1e-13, 0.1
 """Most steps of `Increment.linearised`; out-of-balance forces after the last one over those before
 the first; size of the last one over that of the first; both over the level of forces and of
 displacements; and the forces after a step over those before, above which other tangents follow."""
