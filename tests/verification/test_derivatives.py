@@ -439,7 +439,8 @@ def test_ten_steady_passes_obey_the_laws_of_scale() -> None:
 def test_steady_passes_there_and_back_have_the_derivatives_of_differences(law: str) -> None:
     """A compiled sweep of linear hardening, and one of any law; stress over the largest one.
 
-    The radius moves the nodes of the rim, where gaps are known up to rounding.
+    The radius moves the nodes of the rim, where gaps are known up to rounding. A radius larger by
+    1e-5 is beyond a switch within a column: the differences are of 1e-6.
     """
     hard: dict[str, Any] = {"hardening": "kinematic"}
     if law == "recall":
@@ -450,14 +451,14 @@ def test_steady_passes_there_and_back_have_the_derivatives_of_differences(law: s
     for name in by:
         value = getattr(parameters, name)
         more, less = (
-            exact(replace(parameters, **{name: value * share})) for share in (1 + 1e-5, 1 - 1e-5)
+            exact(replace(parameters, **{name: value * share})) for share in (1 + 1e-6, 1 - 1e-6)
         )
         for of in PASSED[:-2]:
-            expected = (more[of] - less[of]) / 2e-5
+            expected = (more[of] - less[of]) / 2e-6
             stress = abs(found["lowest_residual_x"]) if "residual" in of else 0.0
             size = max(abs(found[of]), abs(expected), stress)
             off = abs(found[f"d_{of}_d_{name}"] * value - expected)
-            assert off < (1e-4 if name == "radius" else 2e-5) * size, (of, name)
+            assert off < (1e-4 if name == "radius" else 5e-5) * size, (of, name)
 
 
 def exact(parameters: Any) -> Any:
