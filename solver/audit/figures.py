@@ -111,6 +111,10 @@ _DECLARED = [
         "ratio of the motion along the partner that small sliding leaves out to the side of an "
         "element",
     ),
+    declare(
+        "audit_derivatives",
+        "ratio of the error of derivatives by one parameter in one increment to their level",
+    ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare(
         "audit_error_contact",
@@ -134,5 +138,6 @@ LIMITS = {
     "audit_touch_time": 0.1,
     "audit_slip_resolution": 0.5,
     "audit_history": 1e-6,
+    "audit_derivatives": 1e-4,
 }
 """Limits that are the same for all runs; `solver.audit.report.limits_at` adds those of a run."""

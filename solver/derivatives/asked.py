@@ -11,11 +11,11 @@ import numpy as np
 from annotated_types import Unit
 
 from solver.errors import ModelError
+from solver.parameters import is_number
 from solver.results.quantities import Quantity
 
 STEP = -1e-6
-"""Difference of a parameter of a neighbouring run over its value. It is negative: a load slightly
-above a whole number of increments would need one more."""
+"""Difference of a parameter of a neighbouring run over its value."""
 
 _WIDER = 10.0
 """The same of a parameter that moves nodes, over `STEP`: positions are known up to rounding, and
@@ -43,10 +43,12 @@ class Derivatives:
     by: tuple[str, ...]
     of: tuple[str, ...]
 
-    @property
-    def cost(self) -> float:
-        """Time of a run with them over that of a run without."""
-        return 1 + _SHARE * (1 + len(self.by))
+    def cost(self, share: float = 0.0) -> float:
+        """Return the time of a run with them over that of a run without.
+
+        ``share`` is that of a neighbouring run, if it is not followed linearly.
+        """
+        return 1 + (share or _SHARE) * (1 + len(self.by))
 
     @property
     def names(self) -> list[str]:
@@ -110,7 +112,9 @@ class Derivatives:
         """
         found = {}
         for name in self.by:
-            value = float(getattr(parameters, name))
+            value = getattr(parameters, name)
+            if not is_number(value):
+                raise ModelError(name, value, "must be a number: it is derived by")
             if value == 0:
                 continue
             found[name] = value * STEP * (_WIDER if name in moving else 1.0)

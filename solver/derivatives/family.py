@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
+from solver.audit.figures import AUDIT
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.derivatives.asked import Derivatives, named, reach
 from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
+from solver.loading.outcome import IncrementFailed
 from solver.loading.program import Program
 from solver.results.acting import acting_on
 from solver.results.fields import Samples
 from solver.results.quantities import QUANTITIES
 from solver.results.run import FinishedRun, Output, Values
+from solver.typing import Array
 
 _JUMP = 1e-3
 """Change of a number over the number, above which it jumps, as the place of a maximum that two
@@ -31,9 +35,8 @@ class Family:
     Parameters
     ----------
     asked : the derivatives
-    scene : the scene, with ``model``, ``program`` and ``view``
+    scene : the scene
     run : parameters of the last run of the path
-    system, samples : those of the run
 
     Raises
     ------
@@ -41,12 +44,73 @@ class Family:
         naming a parameter by which no derivative exists
     """
 
+    def __init__(self, asked: Derivatives, scene: Any, run: Any) -> None:
+        self._asked, self._scene, self._moving = asked, scene, set[str]()
+        self._declared = asked.quantities(type(run), scene.known_quantities)
+
+    def runs(self, run: Any) -> list[Any]:
+        """Return the parameters of the neighbours of a run."""
+        steps = self.steps(run)
+        return [replace(run, **{name: getattr(run, name) + steps[name]}) for name in steps]
+
+    def steps(self, run: Any) -> dict[str, float]:
+        """Return the difference of each parameter by which a run is derived."""
+        return self._asked.steps(run, self._moving)
+
+    def values(
+        self, runs: Sequence[FinishedRun], run: FinishedRun, outputs: Iterable[Output]
+    ) -> Values:
+        """Return the derivatives of results of a run, given its outputs, their ranges and audit.
+
+        They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
+        a line or a map they are those at places of equal number, which may move: the derivatives of
+        its coordinates say how.
+
+        Parameters
+        ----------
+        runs : the run as a neighbour of itself, then the others; none if one failed
+        """
+        found: dict[str, Any] = {q.name: np.nan for q in self._declared if not q.dims}
+        outputs = [_coordinates, *outputs] if runs else []
+        outputs = [each for each in outputs if self._wanted(runs[0], [each])]
+        steps = self.steps(run.parameters)
+        if runs:
+            first = self._wanted(runs[0], outputs)
+        for (by, step), other in zip(steps.items(), runs[1:], strict=False):
+            share = abs(step / getattr(run.parameters, by))
+            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
+            slopes = _slopes(first, self._wanted(other, outputs), step)
+            found |= {named(of, by): slope for of, slope in slopes.items()}
+        audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}
+        return {**audit, **{q: found[q.name] for q in self._declared if q.name in found}}
+
+    def _wanted(self, run: FinishedRun, outputs: Iterable[Output]) -> dict[str, Any]:
+        """Return the results of a run that are to be derived, of some outputs."""
+        each = (output(run).items() for output in outputs)
+        found = {q.name: value for values in each for q, value in values}
+        return {name: found[name] for name in self._asked.of if name in found}
+
+    def _audit(
+        self, run: FinishedRun, runs: Sequence[FinishedRun], outputs: Iterable[Output], found: Any
+    ) -> Values:
+        """Return the audit of the derivatives ``found``, if there is one."""
+        return {}
+
+
+class IncrementalFamily(Family):
+    """The neighbouring runs of a path by increments.
+
+    Parameters
+    ----------
+    asked, scene, run : as of a `Family`; the scene has ``model``, ``program`` and ``view``
+    system, samples : those of the run
+    """
+
     def __init__(
         self, asked: Derivatives, scene: Any, run: Any, system: System, samples: Samples
     ) -> None:
-        self._asked, self._scene, self._moving = asked, scene, set[str]()
-        self._declared = asked.quantities(type(run), scene.known_quantities)
-        models = dict(zip(self._steps(run), map(scene.model, self.runs(run)), strict=True))
+        super().__init__(asked, scene, run)
+        models = dict(zip(self.steps(run), map(scene.model, self.runs(run)), strict=True))
         for name, model in models.items():
             both = zip(system.model.bodies, model.bodies, strict=True)
             if not all(np.array_equal(one.mesh.p, two.mesh.p) for one, two in both):
@@ -64,19 +128,11 @@ class Family:
             for each, own in zip((system, *systems.values()), self._beside, strict=True)
         ]
 
-    def runs(self, run: Any) -> list[Any]:
-        """Return the parameters of the neighbours of a run."""
-        steps = self._steps(run)
-        return [replace(run, **{name: getattr(run, name) + steps[name]}) for name in steps]
-
-    def _steps(self, run: Any) -> dict[str, float]:
-        return self._asked.steps(run, self._moving)
-
     def program(self, run: Any) -> Program:
         """Return the program of a run, with those of its neighbours beside it."""
         beside = tuple(self._scene.program(each) for each in self.runs(run))
         own: Program = self._scene.program(run)
-        for name, other in zip(self._steps(run), beside, strict=True):
+        for name, other in zip(self.steps(run), beside, strict=True):
             if len(other.targets) != len(own.targets):
                 allowed = "must not change the number of increments: derivatives are taken by it"
                 raise ModelError(name, getattr(run, name), allowed)
@@ -112,34 +168,67 @@ class Family:
             for k, (outcome, parameters, samples, acting) in enumerate(each, 1)
         ]
 
-    def values(
+    def derived(
         self, watched: Sequence[Sequence[Any]], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the derivatives of results of a run, given its outputs, and their ranges.
+        """Return the `values` of a run; ``watched`` are those of `watched` for each increment."""
+        return self.values(self.finished(run, watched), run, outputs)
 
-        They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
-        a line or a map they are those at places of equal number, which may move: the derivatives of
-        its coordinates say how.
+    def _audit(
+        self, run: FinishedRun, runs: Sequence[FinishedRun], outputs: Iterable[Output], found: Any
+    ) -> Values:
+        """Return the error of the derivatives by one parameter in one increment.
+
+        An increment that ends a stage is solved again (`NeighbouringRuns.alone`): the first on
+        which a result depends, from a stage on that the parameters of the run decide, as they
+        decide by which parameter.
         """
-        steps, found = self._steps(run.parameters), dict[str, Any]()
-        shares = {by: abs(step / getattr(run.parameters, by)) for by, step in steps.items()}
-        runs = self.finished(run, watched)
-        for (by, share), other in zip(shares.items(), runs[1:], strict=False):
-            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
-        for output in (_coordinates, *outputs) if runs else ():
-            first = _numbers(output(runs[0]))
-            wanted = [name for name in self._asked.of if name in first]
-            if not wanted:
-                continue
-            for (by, step), other in zip(steps.items(), runs[1:], strict=True):
-                after = _numbers(output(other))
-                for of in wanted:
-                    level, values = np.abs(first[of]), np.asarray(after.get(of, np.nan))
-                    most = _JUMP * np.nan_to_num(level).max(initial=0.0)
-                    change = values - first[of]
-                    found[named(of, by)] = np.where(np.abs(change) > most, np.nan, change / step)
-        lacks = {q.name: np.nan for q in self._declared if not q.dims}
-        return {q: (lacks | found)[q.name] for q in self._declared if q.name in lacks | found}
+        chance = crc32(repr(run.parameters).encode())
+        by, step = list(self.steps(run.parameters).items())[chance % (len(runs) - 1)]
+        both = runs[0], runs[1 + chance % (len(runs) - 1)]
+        points = runs[0].outcome.points
+        stages = [name for name, own in points.items() if own.start is not own.state]
+        at, value = chance % max(len(stages), 1), getattr(run.parameters, by)
+        for stage in stages[at:] + stages[:at]:
+            try:
+                alone = [self._alone(runs.index(own), own, run, stage) for own in both]
+            except IncrementFailed:
+                return {}
+            first, after = (self._wanted(own, outputs) for own in alone)
+            errors = [0.0]
+            for of, slope in _slopes(first, after, step).items():
+                own = found[named(of, by)]
+                level = max(_largest(np.divide(first[of], value)), _largest(own)) or 1.0
+                errors.append(_largest(slope - own) / level)
+            if max(errors) > 0:
+                break
+        return {AUDIT["audit_derivatives"]: max(errors)}
+
+    def _alone(self, k: int, own: FinishedRun, run: FinishedRun, stage: str) -> FinishedRun:
+        """Return a neighbour whose increment at the end of a stage is solved again."""
+        before = own.outcome.points[stage]
+        after = self.followers.alone(k, before, run.outcome.points[stage])
+        work = own.outcome.tally.plastic_work + after.plastic_work - before.plastic_work
+        points = {name: after if c is before else c for name, c in own.outcome.points.items()}
+        last = after if own.outcome.last is before else own.outcome.last
+        tally = replace(own.outcome.tally, plastic_work=work)
+        outcome = replace(own.outcome, points=points, last=last, tally=tally)
+        return replace(own, outcome=outcome, kept={})
+
+
+def _slopes(first: Mapping[str, Any], after: Mapping[str, Any], step: float) -> dict[str, Array]:
+    """Return the derivatives of results, given those of the run and those after a step."""
+    found: dict[str, Array] = {}
+    for of, value in first.items():
+        change = np.asarray(after.get(of, np.nan)) - value
+        most = _JUMP * _largest(value)
+        found[of] = np.where(np.abs(change) > most, np.nan, change / step)
+    return found
+
+
+def _largest(values: Any) -> float:
+    """Return the largest absolute value, 0 if there is none."""
+    return float(np.abs(np.nan_to_num(values)).max(initial=0.0))
 
 
 def _coordinates(run: FinishedRun) -> Values:
@@ -147,7 +236,3 @@ def _coordinates(run: FinishedRun) -> Values:
     each = {name: np.asarray(values) for name, values in run.view.coordinates.items()}
     numbers = {name: values for name, values in each.items() if values.dtype.kind == "f"}
     return {QUANTITIES[name]: values for name, values in numbers.items() if name in QUANTITIES}
-
-
-def _numbers(values: Values) -> dict[str, Any]:
-    return {quantity.name: value for quantity, value in values.items()}

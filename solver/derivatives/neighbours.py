@@ -39,9 +39,12 @@ from solver.linear.solvers import Singular, one_thread
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed
-from solver.loading.program import Control
+from solver.loading.program import Control, Tolerances
 from solver.loading.stepper import Stepper, Way, placed
 from solver.typing import Array, Ints
+
+_TIGHT = Tolerances(residual=1e-13, contact=1e-12)
+"""Of an increment of which differences of 1e-6 are taken."""
 
 
 class NeighbouringRuns:
@@ -120,6 +123,33 @@ class NeighbouringRuns:
             replace(own, near=min(last.near, nearest(found[0][1], away)))
             for last, (own, away) in zip(before.beside, found, strict=False)
         )
+
+    def alone(self, number: int, own: Converged, run: Converged) -> Converged:
+        """Return an increment of a neighbour, by the solver of runs, from the end of the run's.
+
+        Only the start of ``own``, the increment as it has followed, is used: not its end, nor the
+        tangent and the active sets that led there.
+
+        Parameters
+        ----------
+        number : of the neighbour; 0 for the run itself
+        run : the same increment of the run
+
+        Raises
+        ------
+        IncrementFailed
+            if it does not converge to the tolerance that a difference needs
+        """
+        found = Increment(
+            self._steppers[number].system,
+            own.start,
+            own.state.time,
+            guess=run.state,
+            contact=not own.separated,
+            elastic_first=False,
+            tolerances=_TIGHT,
+        ).solve()
+        return replace(found, energy=own.energy, near=own.near)
 
 
 def _check_alike(name: str, system: System, other: System) -> None:

@@ -69,10 +69,11 @@ _LESS = 0.8
 line search. Close to a limit load the energy rises along many steps that approach the solution."""
 _SHORTEST = 1e-3
 """Least share of a step to which it is shortened until its forces are finite."""
-_CORRECTIONS, _BALANCED, _CORRECTED, _NEGLIGIBLE, _SLOW = 12, 1e-6, 1e-6, 1e-12, 0.1
+_CORRECTIONS, _BALANCED, _CORRECTED, _SLOW, _NEGLIGIBLE = 12, 1e-6, 1e-6, 0.1, (1e-13, 1e-12)
 """Most steps of `Increment.linearised`; out-of-balance forces after the last one over those before
-the first; size of the last one over that of the first; both over the level of forces and of
-displacements; and the forces after a step over those before, above which other tangents follow."""
+the first; size of the last one over that of the first; the forces after a step over those before,
+above which other tangents follow; negligible forces and steps, over the level of forces and the
+displacements: rounding of positions makes steps larger than forces."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Force level of bodies without load, over the level at which rounding errors alone would exceed
@@ -206,10 +207,10 @@ class Increment:
             residuals, steps, outs = self._residuals(u, responses), list[float](), list[float]()
             for _ in range(_CORRECTIONS):
                 outs.append(self._unbalanced(residuals, candidates, candidates.forces))
-                least = max(_NEGLIGIBLE * end.state.force_scale, rounding(self.system, u))
+                least = max(_NEGLIGIBLE[0] * end.state.force_scale, rounding(self.system, u))
                 balanced = _small(outs, _BALANCED, least)
                 if steps and balanced:
-                    if not turns or _small(steps, _CORRECTED, _NEGLIGIBLE * norm(u)):
+                    if not turns or _small(steps, _CORRECTED, _NEGLIGIBLE[1] * norm(u)):
                         break
                 elif len(outs) > 2 and outs[-1] > _SLOW * outs[-2]:
                     both = zip(self.system.operators, responses, strict=True)

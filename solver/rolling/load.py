@@ -115,6 +115,11 @@ class PassingLoad(ABC):
         start : an `AppliedLoad` to begin with, of this pass, or ``start`` of that of another one
         """
 
+    @property
+    def exact(self) -> Self:
+        """The same, solved so exactly that differences of 1e-6 can be taken."""
+        return self
+
     def changed(self, **changes: Any) -> Self:
         """Return the same with other fields, above all with another load."""
         return replace(self, **changes)

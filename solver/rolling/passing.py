@@ -34,8 +34,11 @@ TOLERANCE = 1e-4
 """Tolerance of a pass: largest deviatoric strain of the residual times 2 G, over the yield
 stress."""
 
-_FORCING = 0.1
-"""Relative residual to which GMRES solves Newton's equation."""
+EXACT = 1e-11
+"""Tolerance of a pass of which differences of 1e-6 are taken."""
+
+_FORCING, _EXACTLY = 0.1, 1e-3
+"""Relative residual to which GMRES solves Newton's equation, also with the tolerance `EXACT`."""
 _KRYLOV, _MOST_KRYLOV = 60, 240
 """Largest number of GMRES iterations for a Newton step: at first, and after some were too few."""
 _STALLED = 0.98
@@ -173,6 +176,7 @@ def passing(
     scale, rough = np.sqrt(track.weights)[..., None], track.rough
     double_shear = 2 * material.elasticity.shear_modulus
     budget, krylov = budget or SolveBudget(), _KRYLOV
+    forcing = _FORCING if tolerance > EXACT else _EXACTLY
     before_it, last = budget.solves, start
 
     def at(added: Array, elastic: AppliedLoad | None = None) -> _At[S]:
@@ -222,7 +226,7 @@ def passing(
             return np.asarray((scale * (change - made)).ravel())
 
         right = (scale * here.residual).ravel()
-        found, solved = gmres(newton, right, _FORCING, krylov)
+        found, solved = gmres(newton, right, forcing, krylov)
         change = found.reshape(shape) / scale
 
         def moved(share: float, here: _At[S] = here, change: Array = change) -> _At[S]:

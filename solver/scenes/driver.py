@@ -8,9 +8,9 @@ from functools import partial
 from itertools import tee
 from typing import Any
 
-from solver.audit.figures import AUDIT
+from solver.audit.figures import AUDIT, LIMITS
 from solver.audit.pairs import untouched
-from solver.audit.report import Audit, audit
+from solver.audit.report import Audit, audit, beyond
 from solver.contact.system import System
 from solver.errors import LimitLoad
 from solver.late import Late
@@ -27,7 +27,7 @@ from solver.results.run import FinishedRun, Output, Values
 from solver.results.singularity import singular_points
 from solver.scenes.scene import Monitor, Scene
 
-_Family = Late("solver.derivatives.family:Family")
+_Family = Late("solver.derivatives.family:IncrementalFamily")
 
 
 def record(scene: Scene, run: FinishedRun) -> Record:
@@ -42,15 +42,17 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     status = Status.OUTSIDE_THEORY if check.outside else Status.OK
     states = {stage: run.outcome.points[stage] for stage in run.view.stages}
     own = scene.warnings(run) if scene.warnings else ()
+    violations = check.violations
     figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
     values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
     if run.derived is not None and scene.derivatives is not None:
         derived = run.derived(run, scene.outputs)
         values |= derived
         own = (*own, *scene.derivatives.notes(derived))
-    if check.violations:
+        violations += beyond({q.name: value for q, value in derived.items()}, LIMITS)
+    if violations:
         status = Status.AUDIT_FAILED
-    messages = run.doubts + check.violations + check.outside + run.notes + check.warnings + own
+    messages = run.doubts + violations + check.outside + run.notes + check.warnings + own
     return replace(
         _labelled(scene, run, status, messages, values),
         mesh=partial(run.samples.fields.on_mesh, states, run.beside),
@@ -140,7 +142,7 @@ def by_increments(
     for walked_to, run in zip(walker.walk(programs, bound), runs, strict=True):
         outcome, derived = walked_to, None
         if family:
-            derived = partial(family.values, outcome.history)
+            derived = partial(family.derived, outcome.history)
             outcome = replace(outcome, history=tuple(own[0] for own in outcome.history))
 
         def check(outcome: Outcome = outcome) -> Audit:

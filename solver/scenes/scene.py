@@ -127,6 +127,8 @@ class Scene:
     quantities : quantities that only this scene declares
     source : digest of the data it was made from, if any; it counts in the ids of runs
     derivatives : what its runs derive by which parameters; none by default
+    derives : time of a neighbouring run over that of a run, if its own ``method`` computes
+        derivatives; 0 if it has none
     allow : what all its studies allow: with ``large_strain`` runs outside small-strain theory are
         ok
     """
@@ -155,6 +157,7 @@ class Scene:
     quantities: tuple[Quantity, ...] = ()
     source: str = ""
     derivatives: Derivatives | None = None
+    derives: float = 0.0
     allow: tuple[str, ...] = ()
 
     def path(

@@ -225,7 +225,7 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
             else:
                 more = effort.seconds / _TOLD, effort.seconds, effort.seconds * _TOLD
                 basis = f"what passes of {scene.name} took elsewhere"
-            cost = 1.0 if scene.derivatives is None else scene.derivatives.cost
+            cost = scene.derivatives.cost(scene.derives) if scene.derivatives else 1.0
             seconds = [each + cost * one for each, one in zip(seconds, more, strict=True)]
             if bounds:
                 bounds.refuse(unknowns=unknowns, increments=longest, cpu_seconds=share * seconds[1])

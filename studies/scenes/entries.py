@@ -51,8 +51,8 @@ def derived(scene: Scene, table: Any) -> Scene:
     StudyError
         for a mistake of the table, below ``derivatives``
     """
-    if scene.method is not None:
-        allowed = f"must be left out: runs of {scene.name} are not computed by increments alone"
+    if scene.method is not None and not scene.derives:
+        allowed = f"must be left out: runs of {scene.name} have none"
         raise StudyError("derivatives", table, allowed)
 
     def with_derivatives(checked: DerivativesTable, source: str) -> Scene:

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -122,7 +123,8 @@ class RollingContact(AppliedLoad):
     normal, tangential : (n,) contact forces on the track; tangential forces are positive against
         the motion of the load [N]
     area : (n,) areas of the vertices' hats [mm2]
-    gap : (n,) gap between track and rim, NaN if they do not face each other [mm]
+    gap, slip : (n,) gap between track and rim, and slip while the axle advances by one element, NaN
+        if they do not face each other [mm]
     status : (n,) status of the contact points, as in `solver.contact.problem`
     bound : (n,) friction bound of the tangential forces [N]
     creepage : 1 + R d(rotation) / d(advance)
@@ -135,6 +137,7 @@ class RollingContact(AppliedLoad):
     tangential: Array
     area: Array
     gap: Array
+    slip: Array
     status: Ints
     bound: Array
     creepage: float
@@ -166,8 +169,6 @@ _NEAR = 0.01
 the first guess."""
 _COVERED = 0.999
 """A vertex is a contact point if at least this share of its hat faces the rim."""
-_SETTLED = 1e-7
-"""Change of contact forces, over the load, below which the contact geometry has converged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,12 +200,19 @@ class RollingWheel(PassingLoad):
     strength : initial shear yield stress of the track [MPa]
     load : force and moment; without friction the moment is left out. Its creepage is
         1 + R d(rotation) / d(advance)
+    settled : change of contact forces, over the load, below which the geometry has converged
     """
 
     track: Track
     rim: Rim
     friction: FrictionLaw
     strength: float = np.inf
+    settled: float = 1e-7
+
+    @property
+    def exact(self) -> Self:
+        """See `PassingLoad`."""
+        return replace(self, settled=1e-13)
 
     @cached_property
     def _length(self) -> float:
@@ -256,10 +264,10 @@ class RollingWheel(PassingLoad):
 
         every = np.zeros((2, len(surface.vertices)))
         every[:, geometry.at] = found.forces.reshape(2, -1)
-        gap, bound = np.full((2, len(surface.vertices)), np.nan)
+        gap, slip, bound = np.full((3, len(surface.vertices)), np.nan)
         bound[geometry.at] = problem.lines.least(found.forces[: len(geometry.at)])
         moved = problem.moved(found.forces, found.rigid)
-        gap[geometry.at] = moved[: len(geometry.at)]
+        gap[geometry.at], slip[geometry.at] = moved.reshape(2, -1)
         turns = self._drive is not None
         return RollingContact(
             force=self._nodal(known.on_track),
@@ -270,6 +278,7 @@ class RollingWheel(PassingLoad):
             tangential=every[1],
             area=geometry.area,
             gap=gap,
+            slip=slip,
             status=known.status,
             bound=bound,
             creepage=float(found.rigid[1]) / self._length if turns else self.load.creepage,
@@ -293,7 +302,7 @@ class RollingWheel(PassingLoad):
             if found is None:
                 raise NoContact("no contact forces were found in a steady pass")
             before, known = known, self._following(geometry, found)
-            if np.abs(known.on_track - before.on_track).max() < _SETTLED * self.load.force:
+            if np.abs(known.on_track - before.on_track).max() < self.settled * self.load.force:
                 if (known.status[[0, -1]] != OPEN).any():
                     raise WindowTooSmall("the contact reaches the ends of the surface")
                 return geometry, problem, found, known

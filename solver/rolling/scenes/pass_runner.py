@@ -13,18 +13,25 @@ import numpy as np
 
 from solver.audit.report import Audit
 from solver.errors import ModelError, NotConverged, WindowTooSmall
+from solver.late import Late
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.materials.law import Law
 from solver.results.acting import Acting
 from solver.results.fields import Samples
 from solver.results.mesh_fields import MeshFields
-from solver.results.run import FinishedRun
+from solver.results.run import FinishedRun, Values
 from solver.results.view import View
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.results.stage import SteadyBody
 from solver.scenes.scene import Monitor, Scene
 from solver.typing import Array
+
+_Family, nearest, distances = (
+    Late("solver.derivatives.family:Family"),
+    Late("solver.derivatives.switches:nearest"),
+    Late("solver.rolling.switches:distances"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +65,18 @@ class Passes(ABC):
     @abstractmethod
     def found(self, budget: SolveBudget) -> Iterator[Pass[Any]]:
         """Yield the passes behind those begun; ``budget`` counts the solves of each."""
+
+    def follow(self, beside: Pass[Any], last: Pass[Any] | None, number: int) -> Pass[Any]:
+        """Return a pass, counted from 0, of a run whose parameters are almost those of another one.
+
+        It is solved to `EXACT`. A body whose runs have no derivatives cannot do this.
+
+        Parameters
+        ----------
+        beside : the same pass of the other run
+        last : the pass before, None for the first one
+        """
+        raise NotImplementedError
 
     @abstractmethod
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
@@ -124,7 +143,8 @@ def by_passes(
     spent = path.seconds
     for run in others:
         tally = replace(run.outcome.tally, seconds=spent + run.outcome.tally.seconds)
-        yield replace(run, outcome=replace(run.outcome, tally=tally))
+        outcome = replace(run.outcome, tally=tally)
+        yield replace(run, outcome=outcome, derived=path.derived([]))
 
 
 class _Path:
@@ -142,6 +162,11 @@ class _Path:
         self._state = state
         self._started = time.process_time() - (state["seconds"].item() if state else 0.0)
         self._elsewhere = 0.0
+        self._scene, self._family = scene, None
+        if scene.derivatives:
+            self._family = _Family(scene.derivatives, scene, last)
+        self._beside: list[_Path] = []
+        self._near = np.inf
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
 
@@ -161,6 +186,38 @@ class _Path:
             self._steps = self._state["steps"].astype(int).tolist()
         if begun := self._passes.begun:
             self._traces, self._left = begun.traces.copy(), begun.left
+        each = [self._last, *self._family.runs(self._last)] if self._family else []
+        plain = replace(self._scene, derivatives=None)
+        self._beside = [_Path(plain, parameters, self._window, None) for parameters in each]
+        for other in self._beside:
+            other._begin(reach)
+        names = self._family.steps(self._last) if self._family else ()
+        for name, other in zip(names, self._beside[1:], strict=True):
+            if not np.array_equal(other._mesh, self._mesh):
+                allowed = "must not change the mesh: derivatives are taken by it"
+                raise ModelError(name, getattr(self._last, name), allowed)
+
+    @property
+    def _mesh(self) -> Array:
+        """Positions of the nodes [mm]."""
+        body = cast("SteadyBody", self._passes.shown(0)[0].system)
+        return np.asarray(body.part.body.mesh.p)
+
+    def _take(self, found: Pass[Any]) -> None:
+        """Go on to a pass that is found."""
+        self._left = self._found.left if self._found else self._left
+        self._found = found
+        self._steps.append(max(found.steps, 1))
+        self._traces.append(self._passes.trace(found))
+        last, switches = found, list[Array]()
+        try:
+            for other in self._beside:  # each begins where the one before it has ended
+                last = other._passes.follow(last, other._found, len(self._steps) - 1)
+                other._take(last)
+                switches.append(distances(last))
+                other._near = min(other._near, nearest(switches[0], switches[-1]))
+        except NotConverged:
+            self._beside = []
 
     def runs(self, runs: Sequence[Any], monitor: Monitor, reach: float) -> Iterator[FinishedRun]:
         """Yield the runs whose passes are found; ``error`` is the reason if others are not.
@@ -178,10 +235,7 @@ class _Path:
         try:
             first = len(self._steps) + 1
             for number, found in enumerate(self._passes.found(self._budget), start=first):
-                self._left = self._found.left if self._found else self._left
-                self._found = found
-                self._steps.append(max(found.steps, 1))
-                self._traces.append(self._passes.trace(found))
+                self._take(found)
                 monitor(min(number / self._last.passes, 0.99))
                 decided = self._passes.decided(self._traces)
                 while remaining and (decided or remaining[0].passes == number):
@@ -201,11 +255,13 @@ class _Path:
         (samples, acting), points, beside = passes.shown(number), {}, None
         view, body = samples.view, cast("SteadyBody", samples.system)
         if found is not None and self.error is None:
-            loaded, left = body.under_load(found), body.left_by(found)
+            loaded, left = body.under_load(found), replace(body.left_by(found), near=self._near)
             points = {name: left if name == view.unloaded else loaded for name in view.stages}
             if (fields := passes.beside) is not None:
                 beside = partial(fields, found)
         seconds = self.seconds
+        runs = [run, *self._family.runs(run)] if self._family else []
+        others = [other.finished(own) for other, own in zip(self._beside, runs, strict=False)]
 
         def check() -> Audit:
             assert found is not None
@@ -230,8 +286,13 @@ class _Path:
             check=check,
             doubts=doubts({view.profile_body: passes.law}),
             beside=beside,
+            derived=self.derived(others),
             state=state,
         )
+
+    def derived(self, runs: Sequence[FinishedRun]) -> Callable[..., Values] | None:
+        """Return what gives the derivatives of a run, of its neighbours; None if none are asked."""
+        return partial(self._family.values, runs) if self._family else None
 
     def _reported(self) -> NotConverged | None:
         """Return the error, with the size of the window that is too small."""

@@ -351,4 +351,5 @@ ROLLING = Scene(
     effort=_effort,
     warnings=_warnings,
     advice=_advice,
+    derives=0.9,
 )  # fmt: skip

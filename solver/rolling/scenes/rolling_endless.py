@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from solver.results.shakedown import ShakedownState
 from solver.results.view import View
 from solver.rolling.audit.plane import audit_pass
 from solver.rolling.load import FULL_SLIP, PassingLoad, RollingLoad
-from solver.rolling.passing import Pass, SolveBudget
+from solver.rolling.passing import EXACT, Pass, SolveBudget, passing
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import Track, standing_pressure, track_of
@@ -179,7 +179,7 @@ def by_steady_passes(
         length, side = others[0].length, others[0].element_size
         note = f"{error}: rolled by increments instead, over {length:.4g} mm"
         note += f" with elements of {side:.3g} mm"
-        rolled = by_increments(scene, others, monitor)
+        rolled = by_increments(replace(scene, derivatives=None), others, monitor)
         return (replace(run, notes=(*run.notes, note)) for run in rolled)
 
     return by_passes(
@@ -217,6 +217,23 @@ class TrackPasses(Passes):
     def found(self, budget: SolveBudget) -> Iterator[Pass[Layers]]:
         """See `Passes`."""
         return steady_passes(self.parameters, self._reach, budget=budget)
+
+    @cached_property
+    def _loads(self) -> list[PassingLoad]:
+        """The loads of the block of passes."""
+        p = self.parameters
+        return [load_on(self._track, p, own) for own in p.block]
+
+    def follow(self, beside: Pass[Layers], last: Pass[Layers] | None, number: int) -> Pass[Layers]:
+        """See `Passes`."""
+        way, load = self._ways[number], self._loads[number % len(self._loads)]
+        state = last.left if last else self._track.rows.virgin(self.law)
+        with one_thread():
+            found = passing(
+                self._track, self.law, load.exact, state if way == 1 else state.mirrored,
+                beside.strain, start=beside.loading.start, parts=beside.parts, tolerance=EXACT,
+            )  # fmt: skip
+        return replace(found, direction=way)
 
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
         """See `Passes`."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from solver.errors import Runaway, WindowTooSmall
+from solver.errors import ModelError, Runaway, WindowTooSmall
 from solver.loading.program import Program, StepRefinement
 from solver.mesh.lines import cells
 from solver.results.cycles import shakedown
@@ -23,7 +23,7 @@ from solver.rolling.scenes.passes import Trace, passes, profiles, shakedown_of
 from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import by_steady_passes
 from solver.scenes.driver import by_increments
-from solver.scenes.scene import Advice, Method
+from solver.scenes.scene import Advice, Method, Monitor, Scene
 from solver.typing import Array
 
 CREEPAGE = declare("creepage", "creepage of the last pass")
@@ -101,10 +101,16 @@ AXLE_ROTATION = declare(
 
 def method(parameters: RollingParameters) -> Method:
     """Return the method of the passes: steady on an endless track, else by increments."""
-    if not parameters.endless:
-        return by_increments
+    return by_steady_passes if parameters.endless else _on_a_track
 
-    return by_steady_passes
+
+def _on_a_track(
+    scene: Scene, runs: Sequence[RollingParameters], monitor: Monitor
+) -> Iterator[FinishedRun]:
+    """Compute the passes by increments."""
+    if scene.derivatives:
+        raise ModelError("track", runs[-1].track, "must be endless: runs have derivatives")
+    return by_increments(scene, runs, monitor)
 
 
 def program(parameters: RollingParameters) -> Program:
