@@ -177,24 +177,6 @@ def test_slopes_save_runs_and_stay_within_the_most(parameter: str, scene: Scene,
         assert taken[1] <= taken[0]
 
 
-def test_slopes_that_are_three_times_too_large_cost_few_runs() -> None:
-    """Interpolation takes over after the first step that hardly comes nearer."""
-    asked = {"parameter": "friction", "of": "peak_contact_pressure", "at": 0.0}
-    asked |= {"within": 1e-3, "between": [0.1, 1.0]}
-    derivative = Quantity(name=named("peak_contact_pressure", "friction"), long_name="")
-    goal, plain = (
-        Goal.read(asked, each, {}) for each in (replace(FAKE, quantities=(derivative,)), FAKE)
-    )
-    for root in np.geomspace(0.11, 0.99, 50):
-
-        def number(value: float, root: float = root) -> float:
-            return value - root
-
-        with_them = searched(goal, number, slope=lambda value: 3.0)
-        assert with_them.reason == "passed"
-        assert len(with_them.rows) <= len(searched(plain, number).rows) + 2
-
-
 @pytest.mark.solves
 def test_slopes_of_the_steady_strain_lead_to_the_shakedown_limit(store: Store) -> None:
     """Bree's wall ratchets above a thermal stress of 4 (1 - 0.8); bisection takes 8 runs."""

@@ -589,7 +589,7 @@ class Search(Chooser):
 
         It is below this point by half of the tolerance, and an end of a narrow bracket if the point
         is in it: if it is exact, two runs are enough. Steps that hardly come nearer are left to the
-        other methods (for ``at`` from then on), and those after which rounds might not suffice.
+        other methods, and those after which there might not be enough rounds.
         """
         goal, (names, aim), points = self.goal, self.goal.leading, []
         for value in (self.low, self.high):
@@ -602,8 +602,6 @@ class Search(Chooser):
         (off, wide), self._led_from = self._led_from, (math.inf, math.inf)
         inside = [each for each in points if low < each[1] < high]
         if not inside or (min(inside)[0] > _FASTER * off and b - a > wide / 2.0):
-            if off == 0.0 or (inside and goal.kind == "at" and goal.parts == 2):
-                self._led_from = 0.0, 0.0  # interpolation is almost as fast: for good
             return []
         self._led_from, point = (min(inside)[0], b - a), goal.scaled(min(inside)[1])
         beside = a + width if point < a + width else point - width / 2.0
