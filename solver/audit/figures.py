@@ -138,6 +138,5 @@ LIMITS = {
     "audit_touch_time": 0.1,
     "audit_slip_resolution": 0.5,
     "audit_history": 1e-6,
-    "audit_derivatives": 1e-4,
 }
 """Limits that are the same for all runs; `solver.audit.report.limits_at` adds those of a run."""

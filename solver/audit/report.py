@@ -235,7 +235,7 @@ def _violations(
         (p.body.material.yield_stress for p in system.parts if not p.body.material.elastic),
         default=1.0,
     )
-    found = sum((beyond(pair.figures, pair.limits) for pair in pairs), ())
+    found = sum((_beyond(pair.figures, pair.limits) for pair in pairs), ())
     return broken(figures, limits, yield_stress) + found
 
 
@@ -275,18 +275,17 @@ def broken(
     figures: Mapping[str, float], limits: Mapping[str, float], yield_stress: float
 ) -> tuple[str, ...]:
     """Return messages on violations: figures beyond their limits, and negative dissipation."""
-    found = beyond(figures, limits)
+    found = _beyond(figures, limits)
     if not figures["audit_dissipation"] >= -LIMITS["audit_yield"] * yield_stress:
         found += (f"plastic dissipation is negative: {figures['audit_dissipation']:.2e}",)
     return found
 
 
-def beyond(figures: Mapping[str, float], limits: Mapping[str, float]) -> tuple[str, ...]:
-    """Return messages on figures beyond their limits; what a run does not have has none."""
+def _beyond(figures: Mapping[str, float], limits: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(
         f"{name} = {figures[name]:.2e} exceeds {limit:.2e}"
         for name, limit in limits.items()
-        if not figures.get(name, 0.0) <= limit
+        if not figures[name] <= limit
     )
 
 

@@ -15,7 +15,8 @@ from solver.parameters import is_number
 from solver.results.quantities import Quantity
 
 STEP = -1e-6
-"""Difference of a parameter of a neighbouring run over its value."""
+"""Difference of a parameter of a neighbouring run over its value. It is negative: a load slightly
+above a whole number of increments would need one more."""
 
 _WIDER = 10.0
 """The same of a parameter that moves nodes, over `STEP`: positions are known up to rounding, and
@@ -28,6 +29,9 @@ accuracy, .7 on a ball, whose surface turns."""
 
 _AT_A_SWITCH = 1e-5
 """Relative change of a parameter: derivatives that hold for less may differ on both sides of it."""
+_DOUBTED = 1e-3
+"""Largest `audit_derivatives` without a warning; usual are 1e-9 to 1e-5. Results near zero, known up
+to rounding, have larger ones."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +107,8 @@ class Derivatives:
         there = {q.name: value for q, value in values.items() if not np.isnan(value).all()}
         lacks = [name for name in self.names if name not in there]
         notes = [f"no derivative was found for {', '.join(lacks)}"] if lacks else []
-        return notes + at_switches({by: there[reach(by)] for by in self.by if reach(by) in there})
+        notes += at_switches({by: there[reach(by)] for by in self.by if reach(by) in there})
+        return notes + doubted({q.name: value for q, value in values.items()})
 
     def steps(self, parameters: Any, moving: Collection[str]) -> dict[str, float]:
         """Return the difference of each parameter that is not zero.
@@ -142,6 +147,19 @@ def at_switches(ranges: Mapping[str, float]) -> list[str]:
         "whether a point yields, touches, sticks or slides"
         for by, least in ranges.items()
         if least < _AT_A_SWITCH
+    ]
+
+
+def doubted(values: Mapping[str, Any]) -> list[str]:
+    """Return a warning where the audit of derivatives found them doubtful, or could not be made."""
+    off = values.get("audit_derivatives", 0.0)
+    if off <= _DOUBTED:
+        return []
+    if np.isnan(off):
+        return ["derivatives were not audited: an increment could not be solved again"]
+    return [
+        f"audit_derivatives = {off:.1e}: derivatives by one parameter differ by so much when one "
+        "increment is solved again; compare them with runs"
     ]
 
 

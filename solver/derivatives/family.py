@@ -183,26 +183,26 @@ class IncrementalFamily(Family):
         which a result depends, from a stage on that the parameters of the run decide, as they
         decide by which parameter.
         """
-        chance = crc32(repr(run.parameters).encode())
-        by, step = list(self.steps(run.parameters).items())[chance % (len(runs) - 1)]
-        both = runs[0], runs[1 + chance % (len(runs) - 1)]
+        chance, number = divmod(crc32(repr(run.parameters).encode()), len(runs) - 1)
+        by, step = list(self.steps(run.parameters).items())[number]
+        both, value = (runs[0], runs[1 + number]), getattr(run.parameters, by)
         points = runs[0].outcome.points
         stages = [name for name, own in points.items() if own.start is not own.state]
-        at, value = chance % max(len(stages), 1), getattr(run.parameters, by)
+        at, errors = chance % max(len(stages), 1), list[float]()
         for stage in stages[at:] + stages[:at]:
             try:
                 alone = [self._alone(runs.index(own), own, run, stage) for own in both]
             except IncrementFailed:
-                return {}
+                return {AUDIT["audit_derivatives"]: np.nan}
             first, after = (self._wanted(own, outputs) for own in alone)
-            errors = [0.0]
             for of, slope in _slopes(first, after, step).items():
                 own = found[named(of, by)]
                 level = max(_largest(np.divide(first[of], value)), _largest(own)) or 1.0
-                errors.append(_largest(slope - own) / level)
-            if max(errors) > 0:
+                if np.isfinite(slope - own).any():
+                    errors.append(_largest(slope - own) / level)
+            if max(errors, default=0.0) > 0:
                 break
-        return {AUDIT["audit_derivatives"]: max(errors)}
+        return {AUDIT["audit_derivatives"]: max(errors)} if errors else {}
 
     def _alone(self, k: int, own: FinishedRun, run: FinishedRun, stage: str) -> FinishedRun:
         """Return a neighbour whose increment at the end of a stage is solved again."""

@@ -18,9 +18,6 @@ from solver.typing import Array
 
 ROUNDING = 1e-9
 """Relative difference of two times: times that differ by less are equal."""
-_LEAST = 2e-5
-"""Length of a last increment over the time at its end: the increment before takes a shorter one in,
-so that neighbouring runs (`solver.derivatives`), slightly longer or shorter, have as many."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +62,7 @@ class Stage:
                 allowed = f"must be between its start {start:g} and its target, in order"
                 raise ModelError(f"{self.name}.stops", self.stops, allowed)
             shares = [(end - begin) / (self.target - start) for begin, end in pairwise(ends)]
-            counts = [max(1, math.ceil(self.steps * share * (1 - _LEAST))) for share in shares]
+            counts = [max(1, math.ceil(self.steps * share - ROUNDING)) for share in shares]
             return [
                 begin + (end - begin) * k / count if k < count else end
                 for (begin, end), count in zip(pairwise(ends), counts, strict=True)
@@ -79,7 +76,7 @@ class Stage:
         way = 1 if self.target >= start else -1
         end = way * self.target
         times, now = [], way * start
-        while now + self.step < end - _LEAST * abs(end):
+        while now + self.step < end - ROUNDING * abs(end):
             now = (round(now / self.step) + 1) * self.step
             times.append(way * now)
         return [*times, self.target]

