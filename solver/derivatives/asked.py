@@ -30,8 +30,8 @@ accuracy, .7 on a ball, whose surface turns."""
 _AT_A_SWITCH = 1e-5
 """Relative change of a parameter: derivatives that hold for less may differ on both sides of it."""
 _DOUBTED = 1e-3
-"""Largest `audit_derivatives` without a warning; usual are 1e-9 to 1e-5. Results near zero, known up
-to rounding, have larger ones."""
+"""Largest `audit_derivatives` without a warning; usual are 1e-9 to 1e-5, and more where a result is
+near zero and known up to rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,7 +25,7 @@ from solver import (
 )
 from solver.contact.state import Converged
 from solver.contact.system import System
-from solver.derivatives.asked import STEP, Derivatives
+from solver.derivatives.asked import STEP, Derivatives, doubted
 from solver.loading.increment import Increment
 from solver.loading.step import newton_step
 from solver.loading.walker import Walker
@@ -388,6 +388,11 @@ def test_the_audit_finds_a_fault_in_the_step_of_a_neighbour(
         off = each.scalars["audit_derivatives"]
         assert each.status is Status.OK, "the run itself is right"
         assert (f"audit_derivatives = {off:.1e}: " in each.message) == (off > 1e-3)
+
+
+def test_an_audit_that_could_not_be_made_is_in_the_message() -> None:
+    assert doubted({}) == doubted({"audit_derivatives": 1e-6}) == []
+    assert "not audited" in doubted({"audit_derivatives": float("nan")})[0]
 
 
 def rolled(**given: Any) -> Any:
