@@ -31,9 +31,11 @@ class Effort:
         most, as the memory is, if smaller elements may be tried
     increments : number in all runs, shared ones counted once, if none is cut; the smallest number
         if passes end when the shakedown state is decided
-    most_increments : the same with all halvings of `Scene.refinement`, with those that yielding may
-        add, or if the shakedown state is never decided
-    slow : processor time of an increment over that of as many unknowns under small strain
+    most_increments : the same with all halvings of `Scene.refinement`, or if the shakedown state is
+        never decided
+    divided : number of increments that yielding may add, since those with a large error are divided
+    slow : ratio of the processor time of an increment to that of one with as many unknowns under
+        small strain
     seconds : processor time of the increments; None if it follows from unknowns and increments
     set_up : processor time of the set-up that paths with equal `Scene.setup` share [s]
     memory : largest memory of the path without libraries [bytes]; by default it follows from the
@@ -44,6 +46,7 @@ class Effort:
     unknowns: int
     increments: int
     most_increments: int
+    divided: int = 0
     slow: float = 1.0
     seconds: float | None = None
     set_up: float = 0.0

@@ -384,7 +384,8 @@ class Pace:
     low, high : factors for the 16 % and 84 % quantiles of past runs
     known_at : number of unknowns of the past runs
     basis : on which data it is based, as text
-    elsewhere : whether these are of other scenes, so that `Effort.slow` counts
+    elsewhere : whether the past runs are of other scenes, so that `Effort.slow` and
+        `Effort.divided` count
     """
 
     rate: float
@@ -399,7 +400,9 @@ class Pace:
         """Return low, likely and high seconds of the increments of a path."""
         least, most = effort.increments, effort.most_increments
         size = max(effort.unknowns, _LEAST)
-        one = self.rate * size**self.exponent * (effort.slow if self.elsewhere else 1.0)
+        one = self.rate * size**self.exponent
+        if self.elsewhere:
+            most, one = most + effort.divided, one * effort.slow
         doubt = math.exp(_DOUBT * abs(math.log(size / self.known_at)))
         likely = one * math.sqrt(least * most)
         return one * least * self.low / doubt, likely, one * most * self.high * doubt

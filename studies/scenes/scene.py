@@ -166,8 +166,7 @@ def _effort(description: Description, parameters: Any, values: Sequence[Any]) ->
             return effort_of(description, scene, [most])
         fewest = scene.repeat.model_copy(update={"times": LEAST})
         least = program_of(scene.model_copy(update={"repeat": fewest}), files).count
-        found = effort_of(description, scene, [least])
-        return replace(found, most_increments=found.most_increments + most - least)
+        return replace(effort_of(description, scene, [least]), most_increments=most)
     runs = [replace(parameters, **{branch: value}) for value in sorted(values)]
     return effort_of(description, scene, [walked([_program(description, r) for r in runs])])
 

@@ -104,7 +104,9 @@ def _listed(found: list[Path]) -> Iterator[str]:
 
 
 def _alike(texts: list[str]) -> int:
-    """Return how many characters at the beginning of all texts are the same."""
+    """Return how many characters at the beginning of several texts are the same; 0 of one text."""
+    if len(texts) < 2:
+        return 0
     return sum(1 for _ in takewhile(lambda own: len({*own}) == 1, zip(*texts, strict=False)))
 
 
@@ -296,7 +298,7 @@ def begun_studies(path: Path | str) -> list[str]:
 def _output(path: Path | str) -> Path:
     """Return the output directory of a study that has a directory there, or else the path."""
     path = Path(path)
-    return path.parents[1] if path.parent.name == "studies" else path
+    return path.parents[1] if path.parent.name == "studies" and is_id(path.name) else path
 
 
 def _progress(file: Path) -> str:

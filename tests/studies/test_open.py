@@ -67,6 +67,17 @@ def test_of_long_entries_the_part_that_differs_is_told(
     assert [line.rpartition(" ")[2] for line in told.splitlines()[1:]] == ["0.8]", "0.7]"]
 
 
+def test_an_entry_of_one_study_alone_is_shown_from_its_beginning(
+    store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    compute_here(fake_study("tour", {"load_ratio": [0.5]}), store)
+    frictions = [0.01 * k for k in range(40)]
+    compute_here(fake_study("tour", {"load_ratio": [0.5], "friction": frictions}), store)
+    open_study(store.directory, "tour").close()
+    (told,) = [text for text in caplog.messages if "of this name" in text]
+    assert "friction = [0.0, 0.01" in told
+
+
 def test_a_study_in_a_directory_is_named_in_its_path(store: Store) -> None:
     tour, other = fake_study("tour"), fake_study("other", {"friction": [0.2]})
     for age, study in ((30, tour), (10, other)):

@@ -127,7 +127,7 @@ def setting(run: xr.Dataset) -> str:
             each.attrs.get("units", ""),
         )
         for name, each in run.coords.items()
-        if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle | made
+        if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle
     ]
     if material and MATERIAL not in run.coords:
         place.append(named(MATERIAL, material))

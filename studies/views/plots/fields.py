@@ -159,7 +159,7 @@ def usual_field(dataset: xr.Dataset) -> str:
 def check_field(field: str, known: list[str]) -> None:
     """Raise a `StudyError` unless `field` is one of the `known`."""
     if field not in known:
-        raise StudyError("field", field, one_of(field, known, "print(open_study(...)) lists all"))
+        raise StudyError("field", field, one_of(field, known, "list(open_study(...)) has all"))
 
 
 def component_of(values: xr.DataArray, component: str | None) -> xr.DataArray:

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
+from scipy.spatial import cKDTree
 from skfem import Mesh
 
 from solver.model.body import Body
@@ -62,9 +63,11 @@ _AROUND = 25.0
 """Half the width of a close-up without a map, over the least side of elements there."""
 _ALIKE = 1.1
 """Largest ratio of lengths of edges that count as equally short."""
+_DENSE = 1000
+"""Number of points of a rigid surface, to find where it is nearest to a body."""
 _NEAR = 0.35
 """How far a rigid surface or a curve is seen beyond the bodies, over their size; one that is no
-larger than they are is seen as far as their size."""
+larger, and no farther away, is seen whole."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -203,7 +206,9 @@ def _extent(shown: _Subject) -> Box:
     others = [s.points for body in shown.rigid for s in body.surfaces.values()]
     for each in (*others, *shown.own.curves.values()):
         start, end = np.asarray(each).min(axis=1), np.asarray(each).max(axis=1)
-        near = size if np.max(end - start) <= size else _NEAR * size
+        near = _NEAR * size
+        if np.max(end - start) <= size and np.all((start >= first - size) & (end <= last + size)):
+            near = size
         low = np.minimum(low, np.maximum(start, first - near))
         high = np.maximum(high, np.minimum(end, last + near))
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
@@ -219,14 +224,14 @@ def _around(box: Box) -> Box:
 
 
 def _close(shown: _Subject, view: View) -> Box | None:
-    """Return a box around the map, or else where the surfaces in contact are meshed finest."""
+    """Return a box around the map, or else where surfaces with short edges are in contact."""
     across, up = view.map_grid
     if across.size and up.size:
         low, high = (float(across.min()), float(up.min())), (float(across.max()), float(up.max()))
         return _around((low[0], high[0], low[1], high[1]))
     if not shown.own.pairs:
         return None
-    side, (x, y) = _finest(shown.own)
+    side, (x, y) = _finest(shown)
     reach = _AROUND * side
     left, right, bottom, top = _extent(shown)
     more = 2 * _MARGIN * reach
@@ -236,20 +241,39 @@ def _close(shown: _Subject, view: View) -> Box | None:
     )  # fmt: skip
 
 
-def _finest(own: Sketch) -> tuple[float, Array]:
+def _finest(shown: _Subject) -> tuple[float, Array]:
     """Return where surfaces in contact have their shortest edges, and the least side there [mm].
 
-    Of edges as short, all along a fillet for example, it is the one nearest to their middle. The
-    side is that of the elements at these edges.
+    Of edges as short, all along a fillet for example, it is the one nearest to the other surface;
+    of those as near, the one in their middle. The side is that of the elements at these edges.
     """
-    bodies = {body.name: body for body in own.bodies}
-    meshed = {side: bodies[side[0]] for pair in own.pairs for side in pair if side[0] in bodies}
-    found = [_edges(body.mesh, body.facets(name)) for (_, name), body in meshed.items()]
-    middles, length, least = (np.concatenate(each, axis=-1) for each in zip(*found, strict=True))
-    short = length <= _ALIKE * length.min()
-    middles = middles[:, short]
+    bodies = {body.name: body for body in shown.own.bodies}
+    tools = {body.name: body.surfaces for body in shown.rigid}
+    found = []
+    for pair in shown.own.pairs:
+        for (name, boundary), (other, facing) in (pair, pair[::-1]):
+            if name in bodies:
+                body = bodies[name]
+                edges = _edges(body.mesh, body.facets(boundary))
+                if other in tools:
+                    beside = _dense(np.asarray(tools[other][facing].points))
+                else:
+                    beside = _edges(bodies[other].mesh, bodies[other].facets(facing))[0]
+                found.append((*edges, cKDTree(beside.T).query(edges[0].T)[0]))
+    middles, length, least, gap = (
+        np.concatenate(each, axis=-1) for each in zip(*found, strict=True)
+    )
+    near = length <= _ALIKE * length.min()
+    near &= gap <= gap[near].min() + length.min()
+    middles = middles[:, near]
     away = np.linalg.norm(middles - middles.mean(axis=1, keepdims=True), axis=0)
-    return float(least[short].min()), middles[:, int(away.argmin())]
+    return float(least[near].min()), middles[:, int(away.argmin())]
+
+
+def _dense(points: Array) -> Array:
+    """Return many points (2, n) on a line through a few."""
+    count = np.arange(points.shape[1])
+    return np.stack([np.interp(np.linspace(0, count[-1], _DENSE), count, x) for x in points])
 
 
 def _edges(mesh: Mesh, facets: Array) -> tuple[Array, Array, Array]:

@@ -541,6 +541,9 @@ def test_a_caption_names_the_steel_also_if_it_is_the_usual_one() -> None:
     assert told(**steel) == "punch · material rail-steel"
     other = told(**{**steel, "yield_stress": 480.0})
     assert "yield stress 480 MPa" in other and "rail-steel" not in other
+    swept = xr.Dataset(attrs={"scene": "punch", "parameters": json.dumps(steel)})
+    swept = swept.assign_coords(yield_stress=((), steel["yield_stress"], {"units": "MPa"}))
+    assert f"yield stress {steel['yield_stress']:g}" in setting(swept).replace("\xa0", " ")
 
 
 def test_a_caption_leaves_out_the_load_of_a_run_whose_passes_have_their_own() -> None:

@@ -276,6 +276,17 @@ def test_without_a_map_the_close_up_is_where_surfaces_in_contact_are_meshed_fine
     assert close.get_xlim()[1] < 12.5
 
 
+def test_of_two_fine_ends_the_close_up_is_at_the_one_in_contact(tmp_path: Path) -> None:
+    shape = SCENE[SCENE.index("kind = ") : SCENE.index("[rigid.ball]")]
+    x = "[{ at = 0, size = 0.1 }, { at = 20, size = 0.1 }]"
+    y = "[{ at = -5 }, { at = 0, size = 0.1 }]"
+    block = f'kind = "grid"\ngrowth = 1.3\nx = {x}\ny = {y}\n'
+    text = SCENE.replace(shape, block).replace("[0, 12]", "[0, 10]").partition("[results.lines")[0]
+    (tmp_path / "block.toml").write_text(text)
+    _, close = setup_figure(beside(tmp_path)("block.toml")).axes
+    assert close.get_xlim()[1] < 10 and close.viewLim.contains(0.1, 0.0)
+
+
 def test_a_tool_no_larger_than_the_bodies_is_seen_whole_and_its_name_within_the_axes() -> None:
     (axes,) = setup_figure(scene_named("mandrel.toml", beside(DATA))).axes
     axes.figure.draw_without_rendering()
