@@ -181,7 +181,7 @@ def fields(solution: Solution) -> np.ndarray:
 
 
 def test_whole_fields_equal_differences_of_runs() -> None:
-    control = PathControl(load_step=0.25, unload_steps=2)
+    control = PathControl(load_step=0.25, unload_steps=2, increment_error=1.0)
     at = {"friction": 0.2, "modulus": 2e4, "pressure": 320.0}
     compare(pads, at, fields, 1e-5, control=control)
 
@@ -278,7 +278,7 @@ def test_sets_hold_up_to_the_end_of_the_range_and_not_beyond(law: str) -> None:
         return pads(friction, 2e4, pressure, strength, law)
 
     at = {"friction": 0.2, "strength": 200.0, "pressure": 320.0}
-    control = PathControl(load_step=0.25, unload_steps=2)
+    control = PathControl(load_step=0.25, unload_steps=2, increment_error=1.0)
     own = sets(pressed(**at), control)
     for (name, value), share in zip(at.items(), ranges(pressed, at, control), strict=True):
         assert 1e-5 < share < 0.02

@@ -367,7 +367,8 @@ def test_a_ball_in_a_ring_has_the_relative_radius(ring: float) -> None:
 
 
 def test_depth_counts_from_the_surface_of_a_groove_and_the_map_has_its_flanks() -> None:
-    record = rolled(**BEARING, conformity=0.515, load_by="force", force=6000.0)
+    hardens = {"hardening": "kinematic", "hardening_ratio": 0.02}
+    record = rolled(**BEARING, **hardens, conformity=0.515, load_by="force", force=6000.0)
     numbers, at = record.scalars, record.coordinates
     assert 0.0 < numbers["least_yielded_depth"] < numbers["most_yielded_depth"]
     assert numbers["least_yielded_depth"] < numbers["depth_of_max_plastic_strain"]

@@ -17,6 +17,8 @@ from tests.reference.wedge import singular_power
 RIGID_PUNCH = scene_named("rigid_punch")
 NU = 0.3
 FRICTIONS = (0.2, 0.4)
+WIDE = {"largest_element": 0.01}
+"""Far from the corner elements are as wide as those of draft accuracy: what is fitted is near."""
 
 
 @cache
@@ -52,7 +54,7 @@ def test_pressure_at_the_corner_goes_as_one_over_the_root_of_the_distance() -> N
 
 @pytest.mark.parametrize("friction", FRICTIONS)
 def test_friction_weakens_the_singularity_as_the_wedge_problem_has_it(friction: float) -> None:
-    found = pressed(friction=friction)
+    found = pressed(friction=friction, **WIDE)
     # for a rigid wedge Dundurs' parameters are 1 and (1 - 2 nu) / (2 - 2 nu); the half-plane slips
     # inward under the punch, which is the punch slipping outward
     exact = singular_power(friction, slip="outward", alpha=1.0, beta=(1 - 2 * NU) / (2 - 2 * NU))
@@ -62,10 +64,10 @@ def test_friction_weakens_the_singularity_as_the_wedge_problem_has_it(friction: 
 
 @pytest.mark.parametrize("friction", FRICTIONS)
 def test_the_middle_sticks_as_the_coupled_integral_equations_have_it(friction: float) -> None:
-    assert pressed(friction=friction)["stick_fraction"] == pytest.approx(
+    assert pressed(friction=friction, **WIDE)["stick_fraction"] == pytest.approx(
         stick_width(friction, NU), rel=0.02
     )
-    assert np.isnan(pressed(friction=friction)["pressure_error"])
+    assert np.isnan(pressed(friction=friction, **WIDE)["pressure_error"])
 
 
 def test_a_small_half_plane_changes_the_part_that_sticks() -> None:

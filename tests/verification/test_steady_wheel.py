@@ -155,14 +155,14 @@ def test_passes_of_a_wheel_shake_down_below_the_limit_and_ratchet_above():
 # -- more shear than the material bears ------------------------------------------------------------
 
 
-def locked(pressure, friction):
+def locked(pressure, friction, size):
     """The first pass of a locked wheel, coarsely, without hardening."""
-    _, place, material, load = wheel(pressure=pressure, size=2.0, friction=friction, creepage=1.0)
+    _, place, material, load = wheel(pressure=pressure, size=size, friction=friction, creepage=1.0)
     return next(iter(rolling(place, material, load, [1]))), material, place
 
 
 def test_a_locked_wheel_flattens_its_contact_until_the_surface_bears_the_shear():
-    found, material, place = locked(2.3, 0.5)  # 1.15 times what the surface bears
+    found, material, place = locked(2.3, 0.5, 2.0)  # 1.15 times what the surface bears
     touching = found.loading
     assert touching.tangential.sum() == pytest.approx(-0.5 * touching.normal.sum(), rel=1e-9)
     assert not audit_pass(place, material, found, None, 1).violations
@@ -171,7 +171,7 @@ def test_a_locked_wheel_flattens_its_contact_until_the_surface_bears_the_shear()
 
 def test_without_hardening_a_locked_wheel_has_its_limit():
     with pytest.raises(LimitLoad, match="a steady pass adds more than 30%"):
-        locked(4.3, 0.5)
+        locked(4.3, 0.5, 4.0)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5])

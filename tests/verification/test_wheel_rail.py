@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
 from solver.rolling.rail.track import PrismField
 from solver.rolling.scenes.initial_stress import RollerStraightened
-from solver.rolling.scenes.wheel_rail import WheelRailParameters
+from solver.rolling.scenes.wheel_rail import ELEMENT_SIZE, WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact
 from solver.rolling.scenes.wheel_rail_setup import RolledRail
 from solver.rolling.scenes.wheel_rail_track import geometry, section_of, track_of
@@ -220,9 +220,14 @@ def test_the_effort_is_that_of_the_run() -> None:
     assert effort.increments == effort.most_increments == third.scalars["increments"] == 3
 
 
-def test_a_load_above_the_limit_is_a_record_with_a_message() -> None:
-    soft = ("hardening", "none"), ("hardening_ratio", 0.0), ("friction", 0.0)
-    (record,) = rolled(*soft, ("load", 700e3))
+def test_a_load_above_the_limit_is_a_record_with_a_message(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The contact is two thirds longer and wider than that of 150 kN, and so are the elements."""
+    monkeypatch.setitem(cast("dict[str, float]", ELEMENT_SIZE), "draft", 3.4)
+    soft = {"hardening": "none", "hardening_ratio": 0.0, "friction": 0.0}
+    parameters = SCENE.parameters(**PUBLISHED | soft, load=700e3)
+    (record,) = SCENE.path(parameters, [1], lambda share: None)
     assert record.status is Status.LIMIT_LOAD
     assert "grows without bound" in record.message
     assert record.scalars["degrees_of_freedom"] > 0

@@ -51,10 +51,9 @@ def test_a_nearly_incompressible_cylinder_is_that_of_its_shear_stress(a: float) 
         assert body.audit().passed
 
 
-@pytest.mark.parametrize("a", [8.0, 20.0])
-def test_the_limit_load_of_a_strip_is_that_of_prandtl(a: float) -> None:
+def test_the_limit_load_of_a_strip_is_that_of_prandtl() -> None:
     """(2 + pi) k; measured 1.0047 to 1.0063, as of von Mises."""
-    law = ideal(a, 0.45)
+    law = ideal(20.0, 0.45)
     with pytest.raises(LimitLoad, match="flows around") as outcome:
         prandtl.pressed(law, "plane_strain", (2 + np.pi) * law.shear_yield_stress)
     assert 0.99 < outcome.value.reached < outcome.value.attempted < 1.015
@@ -87,7 +86,7 @@ def bent_bar() -> Any:
         kinematics="plane_stress", supports={"left": "xy"},
         pressure={"top": 12.0, "right": -200.0},
     )  # fmt: skip
-    return solve(Model(bodies=(bar,)), control=PathControl(load_step=0.2))
+    return solve(Model(bodies=(bar,)), control=PathControl(load_step=0.2, increment_error=1.0))
 
 
 def along_the_deviator(find: Any) -> Any:
