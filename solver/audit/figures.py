@@ -111,10 +111,6 @@ _DECLARED = [
         "ratio of the motion along the partner that small sliding leaves out to the side of an "
         "element",
     ),
-    declare(
-        "audit_derivatives",
-        "ratio of the error of derivatives by one parameter in one increment to their level",
-    ),
     declare("audit_error_loaded", "estimated relative error of stress under load, energy norm"),
     declare(
         "audit_error_contact",

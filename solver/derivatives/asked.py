@@ -34,6 +34,12 @@ _DOUBTED = 1e-3
 near zero and known up to rounding."""
 
 
+AUDITED = Quantity(
+    name="audit_derivatives",
+    long_name="ratio of the error of derivatives by one parameter in one increment to their level",
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Derivatives:
     """Derivatives of results by parameters.
@@ -100,7 +106,8 @@ class Derivatives:
             for of in self.of
         ]
         holds = "relative change of {} up to which its derivatives hold, at most 1"
-        return derived + [Quantity(name=reach(by), long_name=holds.format(by)) for by in self.by]
+        ranges = [Quantity(name=reach(by), long_name=holds.format(by)) for by in self.by]
+        return [*derived, *ranges, AUDITED]
 
     def notes(self, values: Mapping[Quantity, Any]) -> list[str]:
         """Return what a user must know of the values of a run."""
@@ -152,7 +159,7 @@ def at_switches(ranges: Mapping[str, float]) -> list[str]:
 
 def doubted(values: Mapping[str, Any]) -> list[str]:
     """Return a warning where the audit of derivatives found them doubtful, or could not be made."""
-    off = values.get("audit_derivatives", 0.0)
+    off = values.get(AUDITED.name, 0.0)
     if off <= _DOUBTED:
         return []
     if np.isnan(off):

@@ -9,10 +9,9 @@ from zlib import crc32
 
 import numpy as np
 
-from solver.audit.figures import AUDIT
 from solver.contact.state import Converged
 from solver.contact.system import System
-from solver.derivatives.asked import Derivatives, named, reach
+from solver.derivatives.asked import AUDITED, Derivatives, named, reach
 from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
 from solver.loading.outcome import IncrementFailed
@@ -70,7 +69,9 @@ class Family:
         ----------
         runs : the run as a neighbour of itself, then the others; none if one failed
         """
-        found: dict[str, Any] = {q.name: np.nan for q in self._declared if not q.dims}
+        found: dict[str, Any] = {
+            q.name: np.nan for q in self._declared if not q.dims and q is not AUDITED
+        }
         outputs = [_coordinates, *outputs] if runs else []
         outputs = [each for each in outputs if self._wanted(runs[0], [each])]
         steps = self.steps(run.parameters)
@@ -193,7 +194,7 @@ class IncrementalFamily(Family):
             try:
                 alone = [self._alone(runs.index(own), own, run, stage) for own in both]
             except IncrementFailed:
-                return {AUDIT["audit_derivatives"]: np.nan}
+                return {AUDITED: np.nan}
             first, after = (self._wanted(own, outputs) for own in alone)
             for of, slope in _slopes(first, after, step).items():
                 own = found[named(of, by)]
@@ -202,7 +203,7 @@ class IncrementalFamily(Family):
                     errors.append(_largest(slope - own) / level)
             if max(errors, default=0.0) > 0:
                 break
-        return {AUDIT["audit_derivatives"]: max(errors)} if errors else {}
+        return {AUDITED: max(errors)} if errors else {}
 
     def _alone(self, k: int, own: FinishedRun, run: FinishedRun, stage: str) -> FinishedRun:
         """Return a neighbour whose increment at the end of a stage is solved again."""
