@@ -71,18 +71,20 @@ class Family:
         runs : the run as a neighbour of itself, then the others; none if one failed
         """
         found: dict[str, Any] = {q.name: np.nan for q in self._declared if not q.dims}
-        outputs = [_coordinates, *outputs] if runs else []
-        outputs = [each for each in outputs if self._wanted(runs[0], [each])]
+        each = [(output, output(runs[0])) for output in (_coordinates, *outputs)] if runs else []
+        outputs = [output for output, own in each if {q.name for q in own} & {*self._asked.of}]
+        first = self._wanted(runs[0], outputs) if runs else {}
+        dims = {q.name: q.dims for _, own in each for q in own}  # a scene may add one to a quantity
+        of_each = {named(of, by): dims[of] for by in self._asked.by for of in first}
         steps = self.steps(run.parameters)
-        if runs:
-            first = self._wanted(runs[0], outputs)
         for (by, step), other in zip(steps.items(), runs[1:], strict=False):
             share = abs(step / getattr(run.parameters, by))
             found[reach(by)] = min(share * other.outcome.last.near, 1.0)
             slopes = _slopes(first, self._wanted(other, outputs), step)
             found |= {named(of, by): slope for of, slope in slopes.items()}
         audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}
-        return {**audit, **{q: found[q.name] for q in self._declared if q.name in found}}
+        given = (q.at(*of_each.get(q.name, q.dims)) for q in self._declared if q.name in found)
+        return {**audit, **{q: found[q.name] for q in given}}
 
     def _wanted(self, run: FinishedRun, outputs: Iterable[Output]) -> dict[str, Any]:
         """Return the results of a run that are to be derived, of some outputs."""
