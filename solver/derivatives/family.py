@@ -60,7 +60,7 @@ class Family:
     def values(
         self, runs: Sequence[FinishedRun], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the derivatives of results of a run, given its outputs, their ranges and audit.
+        """Return the derivatives of results of a run, given its outputs, and their audit.
 
         They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
         a line or a map they are those at places of equal number, which may move: the derivatives of
@@ -70,7 +70,10 @@ class Family:
         ----------
         runs : the run as a neighbour of itself, then the others; none if one failed
         """
-        found: dict[str, Any] = {q.name: np.nan for q in self._declared if not q.dims}
+        names = self._asked.names
+        found: dict[str, Any] = {
+            q.name: np.nan for q in self._declared if q.name in names and not q.dims
+        }
         each = [(output, output(runs[0])) for output in (_coordinates, *outputs)] if runs else []
         outputs = [output for output, own in each if {q.name for q in own} & {*self._asked.of}]
         first = self._wanted(runs[0], outputs) if runs else {}
@@ -78,8 +81,6 @@ class Family:
         of_each = {named(of, by): dims[of] for by in self._asked.by for of in first}
         steps = self.steps(run.parameters)
         for (by, step), other in zip(steps.items(), runs[1:], strict=False):
-            share = abs(step / getattr(run.parameters, by))
-            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
             slopes = _slopes(first, self._wanted(other, outputs), step)
             found |= {named(of, by): slope for of, slope in slopes.items()}
         audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}
@@ -173,8 +174,17 @@ class IncrementalFamily(Family):
     def derived(
         self, watched: Sequence[Sequence[Any]], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the `values` of a run; ``watched`` are those of `watched` for each increment."""
-        return self.values(self.finished(run, watched), run, outputs)
+        """Return the `values` of a run, and the ranges in which the derivatives hold.
+
+        ``watched`` are those of `watched` for each increment.
+        """
+        runs = self.finished(run, watched)
+        found = dict.fromkeys(map(reach, self._asked.by), np.nan)
+        for (by, step), other in zip(self.steps(run.parameters).items(), runs[1:], strict=False):
+            share = abs(step / getattr(run.parameters, by))
+            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
+        ranges = {q: found[q.name] for q in self._declared if q.name in found}
+        return {**self.values(runs, run, outputs), **ranges}
 
     def _audit(
         self, run: FinishedRun, runs: Sequence[FinishedRun], outputs: Iterable[Output], found: Any

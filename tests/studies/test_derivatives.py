@@ -82,6 +82,7 @@ def test_lines_of_every_pass_are_stored_with_their_dimensions(store: Store) -> N
     profile, *slopes = (data[each] for each in ("residual_profile", *map(PROFILE.format, by)))
     assert {each.dims for each in slopes} == {profile.dims} and "pass" in profile.dims
     assert {each.attrs["units"] for each in slopes} == {"1"}
+    assert not [name for name in data if str(name).startswith("derivative_range")]
     both = sum(slope * value for slope, value in zip(slopes, by.values(), strict=True))
     size = float(abs(profile).max() + abs(slopes[1] * by["youngs_modulus"]).max())
     assert float(abs(both - profile).max()) < 1e-4 * size

@@ -27,11 +27,7 @@ from solver.rolling.results.stage import SteadyBody
 from solver.scenes.scene import Monitor, Scene
 from solver.typing import Array
 
-_Family, nearest, distances = (
-    Late("solver.derivatives.family:Family"),
-    Late("solver.derivatives.switches:nearest"),
-    Late("solver.rolling.switches:distances"),
-)
+_Family = Late("solver.derivatives.family:Family")
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +162,6 @@ class _Path:
         if scene.derivatives:
             self._family = _Family(scene.derivatives, scene, last)
         self._beside: list[_Path] = []
-        self._near = np.inf
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
 
@@ -209,13 +204,11 @@ class _Path:
         self._found = found
         self._steps.append(max(found.steps, 1))
         self._traces.append(self._passes.trace(found))
-        last, switches = found, list[Array]()
+        last = found
         try:
             for other in self._beside:  # each begins where the one before it has ended
                 last = other._passes.follow(last, other._found, len(self._steps) - 1)
                 other._take(last)
-                switches.append(distances(last))
-                other._near = min(other._near, nearest(switches[0], switches[-1]))
         except NotConverged:
             self._beside = []
 
@@ -255,7 +248,7 @@ class _Path:
         (samples, acting), points, beside = passes.shown(number), {}, None
         view, body = samples.view, cast("SteadyBody", samples.system)
         if found is not None and self.error is None:
-            loaded, left = body.under_load(found), replace(body.left_by(found), near=self._near)
+            loaded, left = body.under_load(found), body.left_by(found)
             points = {name: left if name == view.unloaded else loaded for name in view.stages}
             if (fields := passes.beside) is not None:
                 beside = partial(fields, found)
