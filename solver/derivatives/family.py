@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 from zlib import crc32
@@ -46,6 +47,7 @@ class Family:
 
     def __init__(self, asked: Derivatives, scene: Any, run: Any) -> None:
         self._asked, self._scene, self._moving = asked, scene, set[str]()
+        self._ways = dict[str, int]()
         self._declared = asked.quantities(type(run), scene.known_quantities)
 
     def runs(self, run: Any) -> list[Any]:
@@ -55,7 +57,31 @@ class Family:
 
     def steps(self, run: Any) -> dict[str, float]:
         """Return the difference of each parameter by which a run is derived."""
-        return self._asked.steps(run, self._moving)
+        steps = self._asked.steps(run, self._moving).items()
+        return {name: step * way for name, step in steps if (way := self._ways.get(name, 1))}
+
+    def keep_mesh(self, run: Any, same: Callable[[Any], bool]) -> None:
+        """Take each difference to the side on which the mesh is that of a run, none without one.
+
+        Parameters
+        ----------
+        same : (parameters) -> whether they have the mesh of the run
+
+        Raises
+        ------
+        ModelError
+            naming a parameter that changes the mesh on both sides
+        """
+        self._ways = {}
+        for name, step in self.steps(run).items():
+            value, sides = getattr(run, name), dict[int, bool]()
+            for way in (1, -1):
+                with suppress(ModelError):  # the end of its range
+                    sides[way] = same(replace(run, **{name: value + way * step}))
+            if not any(sides.values()) and len(sides) > 1:
+                allowed = "must not change the mesh: derivatives are taken by it"
+                raise ModelError(name, value, allowed)
+            self._ways[name] = next((way for way, kept in sides.items() if kept), 0)
 
     def values(
         self, runs: Sequence[FinishedRun], run: FinishedRun, outputs: Iterable[Output]
@@ -68,8 +94,9 @@ class Family:
 
         Parameters
         ----------
-        runs : the run as a neighbour of itself, then the others; none if one failed
+        runs : the run as a neighbour of itself, then the others; none if this is not known
         """
+        runs = runs if runs and runs[0].complete else ()
         names = self._asked.names
         found: dict[str, Any] = {
             q.name: np.nan for q in self._declared if q.name in names and not q.dims
@@ -81,6 +108,8 @@ class Family:
         of_each = {named(of, by): dims[of] for by in self._asked.by for of in first}
         steps = self.steps(run.parameters)
         for (by, step), other in zip(steps.items(), runs[1:], strict=False):
+            if not other.complete:
+                continue
             slopes = _slopes(first, self._wanted(other, outputs), step)
             found |= {named(of, by): slope for of, slope in slopes.items()}
         audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}

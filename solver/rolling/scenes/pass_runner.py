@@ -74,6 +74,10 @@ class Passes(ABC):
         """
         raise NotImplementedError
 
+    def same_mesh(self, parameters: Any) -> bool:
+        """Return whether a run with other parameters can be followed on this mesh."""
+        raise NotImplementedError
+
     @abstractmethod
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
         """Return the fields of a `SteadyBody`, and what acts on it, in a pass counted from 0."""
@@ -181,22 +185,14 @@ class _Path:
             self._steps = self._state["steps"].astype(int).tolist()
         if begun := self._passes.begun:
             self._traces, self._left = begun.traces.copy(), begun.left
-        each = [self._last, *self._family.runs(self._last)] if self._family else []
+        each = []
+        if self._family:
+            self._family.keep_mesh(self._last, self._passes.same_mesh)
+            each = [self._last, *self._family.runs(self._last)]
         plain = replace(self._scene, derivatives=None)
         self._beside = [_Path(plain, parameters, self._window, None) for parameters in each]
         for other in self._beside:
             other._begin(reach)
-        names = self._family.steps(self._last) if self._family else ()
-        for name, other in zip(names, self._beside[1:], strict=True):
-            if not np.array_equal(other._mesh, self._mesh):
-                allowed = "must not change the mesh: derivatives are taken by it"
-                raise ModelError(name, getattr(self._last, name), allowed)
-
-    @property
-    def _mesh(self) -> Array:
-        """Positions of the nodes [mm]."""
-        body = cast("SteadyBody", self._passes.shown(0)[0].system)
-        return np.asarray(body.part.body.mesh.p)
 
     def _take(self, found: Pass[Any]) -> None:
         """Go on to a pass that is found."""
@@ -205,12 +201,14 @@ class _Path:
         self._steps.append(max(found.steps, 1))
         self._traces.append(self._passes.trace(found))
         last = found
-        try:
-            for other in self._beside:  # each begins where the one before it has ended
+        for other in self._beside:  # each begins where the one before it has ended
+            if other.error or self._beside[0].error:
+                continue
+            try:
                 last = other._passes.follow(last, other._found, len(self._steps) - 1)
                 other._take(last)
-        except NotConverged:
-            self._beside = []
+            except NotConverged as failure:
+                other.error = failure
 
     def runs(self, runs: Sequence[Any], monitor: Monitor, reach: float) -> Iterator[FinishedRun]:
         """Yield the runs whose passes are found; ``error`` is the reason if others are not.
