@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 from zlib import crc32
@@ -45,6 +46,7 @@ class Family:
 
     def __init__(self, asked: Derivatives, scene: Any, run: Any) -> None:
         self._asked, self._scene, self._moving = asked, scene, set[str]()
+        self._ways = dict[str, int]()
         self._declared = asked.quantities(type(run), scene.known_quantities)
 
     def runs(self, run: Any) -> list[Any]:
@@ -54,12 +56,36 @@ class Family:
 
     def steps(self, run: Any) -> dict[str, float]:
         """Return the difference of each parameter by which a run is derived."""
-        return self._asked.steps(run, self._moving)
+        steps = self._asked.steps(run, self._moving).items()
+        return {name: step * way for name, step in steps if (way := self._ways.get(name, 1))}
+
+    def keep_mesh(self, run: Any, same: Callable[[Any], bool]) -> None:
+        """Take each difference to the side on which the mesh is that of a run, none without one.
+
+        Parameters
+        ----------
+        same : (parameters) -> whether they have the mesh of the run
+
+        Raises
+        ------
+        ModelError
+            naming a parameter that changes the mesh on both sides
+        """
+        self._ways = {}
+        for name, step in self.steps(run).items():
+            value, sides = getattr(run, name), dict[int, bool]()
+            for way in (1, -1):
+                with suppress(ModelError):  # the end of its range
+                    sides[way] = same(replace(run, **{name: value + way * step}))
+            if not any(sides.values()) and len(sides) > 1:
+                allowed = "must not change the mesh: derivatives are taken by it"
+                raise ModelError(name, value, allowed)
+            self._ways[name] = next((way for way, kept in sides.items() if kept), 0)
 
     def values(
         self, runs: Sequence[FinishedRun], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the derivatives of results of a run, given its outputs, their ranges and audit.
+        """Return the derivatives of results of a run, given its outputs, and their audit.
 
         They are NaN where a neighbour failed or has no such number, and where the number jumps. Of
         a line or a map they are those at places of equal number, which may move: the derivatives of
@@ -67,23 +93,27 @@ class Family:
 
         Parameters
         ----------
-        runs : the run as a neighbour of itself, then the others; none if one failed
+        runs : the run as a neighbour of itself, then the others; none if this is not known
         """
+        runs = runs if runs and runs[0].complete else ()
+        names = self._asked.names
         found: dict[str, Any] = {
-            q.name: np.nan for q in self._declared if not q.dims and q is not AUDITED
+            q.name: np.nan for q in self._declared if q.name in names and not q.dims
         }
-        outputs = [_coordinates, *outputs] if runs else []
-        outputs = [each for each in outputs if self._wanted(runs[0], [each])]
+        each = [(output, output(runs[0])) for output in (_coordinates, *outputs)] if runs else []
+        outputs = [output for output, own in each if {q.name for q in own} & {*self._asked.of}]
+        first = self._wanted(runs[0], outputs) if runs else {}
+        dims = {q.name: q.dims for _, own in each for q in own}  # a scene may add one to a quantity
+        of_each = {named(of, by): dims[of] for by in self._asked.by for of in first}
         steps = self.steps(run.parameters)
-        if runs:
-            first = self._wanted(runs[0], outputs)
         for (by, step), other in zip(steps.items(), runs[1:], strict=False):
-            share = abs(step / getattr(run.parameters, by))
-            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
+            if not other.complete:
+                continue
             slopes = _slopes(first, self._wanted(other, outputs), step)
             found |= {named(of, by): slope for of, slope in slopes.items()}
         audit = self._audit(run, runs, outputs, found) if len(runs) > 1 else {}
-        return {**audit, **{q: found[q.name] for q in self._declared if q.name in found}}
+        given = (q.at(*of_each.get(q.name, q.dims)) for q in self._declared if q.name in found)
+        return {**audit, **{q: found[q.name] for q in given}}
 
     def _wanted(self, run: FinishedRun, outputs: Iterable[Output]) -> dict[str, Any]:
         """Return the results of a run that are to be derived, of some outputs."""
@@ -172,8 +202,17 @@ class IncrementalFamily(Family):
     def derived(
         self, watched: Sequence[Sequence[Any]], run: FinishedRun, outputs: Iterable[Output]
     ) -> Values:
-        """Return the `values` of a run; ``watched`` are those of `watched` for each increment."""
-        return self.values(self.finished(run, watched), run, outputs)
+        """Return the `values` of a run, and the ranges in which the derivatives hold.
+
+        ``watched`` are those of `watched` for each increment.
+        """
+        runs = self.finished(run, watched)
+        found = dict.fromkeys(map(reach, self._asked.by), np.nan)
+        for (by, step), other in zip(self.steps(run.parameters).items(), runs[1:], strict=False):
+            share = abs(step / getattr(run.parameters, by))
+            found[reach(by)] = min(share * other.outcome.last.near, 1.0)
+        ranges = {q: found[q.name] for q in self._declared if q.name in found}
+        return {**self.values(runs, run, outputs), **ranges}
 
     def _audit(
         self, run: FinishedRun, runs: Sequence[FinishedRun], outputs: Iterable[Output], found: Any

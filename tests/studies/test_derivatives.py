@@ -66,6 +66,31 @@ def test_lines_have_the_derivatives_of_differences(store: Store) -> None:
         assert float(abs(found - expected).max()) < 2e-5 * float(abs(expected).max())
 
 
+@pytest.mark.solves
+def test_lines_of_every_pass_are_stored_with_their_dimensions(store: Store) -> None:
+    """Residual stress over depth is of degree one in yield stress and modulus together."""
+    how = {"accuracy": "draft", "passes": 2, "friction": 0.2, "hardening": "kinematic"}
+    by = {"yield_stress": 500.0, "youngs_modulus": 2.1e5}
+    study = Study.from_dict(
+        {
+            "name": "passed", "scene": "rolling", "parameters": {**how, **by, "load_ratio": 2.2},
+            "derivatives": {"by": [*by], "of": ["residual_profile"]},
+        }
+    )  # fmt: skip
+    compute_here(study, store, study.problem)
+    data = open_study(store.dataset_path(study.id))
+    profile, *slopes = (data[each] for each in ("residual_profile", *map(PROFILE.format, by)))
+    assert {each.dims for each in slopes} == {profile.dims} and "pass" in profile.dims
+    assert {each.attrs["units"] for each in slopes} == {"1"}
+    assert not [name for name in data if str(name).startswith("derivative_range")]
+    both = sum(slope * value for slope, value in zip(slopes, by.values(), strict=True))
+    size = float(abs(profile).max() + abs(slopes[1] * by["youngs_modulus"]).max())
+    assert float(abs(both - profile).max()) < 1e-4 * size
+
+
+PROFILE = "d_residual_profile_d_{}"
+
+
 def test_elasticities_are_of_numbers_and_parameters_that_a_run_has() -> None:
     scalars = {"force": 50.0, "d_force_d_size": 20.0, "d_force_d_friction": None, "d_x_d_size": 1.0}
     found = elasticities(

@@ -26,6 +26,7 @@ from solver import (
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.derivatives.asked import STEP, Derivatives, doubted
+from solver.errors import NotConverged
 from solver.loading.increment import Increment
 from solver.loading.step import newton_step
 from solver.loading.walker import Walker
@@ -33,7 +34,7 @@ from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, TrescaMat
 from solver.mesh import grid
 from solver.results.record import Status
 from solver.rolling.passing import EXACT
-from solver.rolling.scenes.rolling_endless import load_on
+from solver.rolling.scenes.rolling_endless import TrackPasses, load_on
 from solver.scenes import Scene
 from solver.shipped import SCENES
 from studies.scenes.registry import scene_named
@@ -464,6 +465,53 @@ def exact(parameters: Any) -> Any:
     ):
         (record,) = SCENES["rolling"].path(parameters, [parameters.passes], lambda share: None)
     return record.scalars
+
+
+def test_a_neighbour_with_another_mesh_is_taken_on_the_other_side() -> None:
+    """The half-width of the mesh is rounded to three digits: a smaller load has a coarser one."""
+    usual = rolled(passes=1)
+    rounding = float(f"{usual.half_width:.2f}") + 0.005
+    edge = usual.load_ratio * rounding / usual.half_width
+    near, beyond = (rolled(passes=1, load_ratio=edge * (1 + share)) for share in (5e-7, 3e-6))
+    below = replace(near, load_ratio=near.load_ratio * (1 - 1e-6))
+    assert below.mesh_width < near.mesh_width == beyond.mesh_width
+    same_slope("load_ratio", near, beyond)
+
+
+def test_a_neighbour_whose_rim_is_longer_is_taken_on_the_other_side() -> None:
+    parameters = rolled(passes=1, radius=334.92, element_size=0.8414898492000003)
+    softer = replace(parameters, youngs_modulus=parameters.youngs_modulus * (1 - 1e-6))
+    assert softer.reach > parameters.reach + 0.5
+    stiffer = replace(parameters, youngs_modulus=parameters.youngs_modulus * (1 + 5e-6))
+    same_slope("youngs_modulus", parameters, stiffer)
+
+
+def same_slope(by: str, *each: Any) -> None:
+    """Check that runs with almost the same parameters have the same derivative."""
+    scene, of = SCENES["rolling"], ("axle_height",)
+    found = [numbers(scene, parameters, (by,), of) for parameters in each]
+    assert [record.message for record in found] == ["", ""]
+    (own,), (other,) = (shares(record, *of, (by,)) for record in found)
+    assert abs(own) > 0.1 and own == pytest.approx(other, rel=1e-4)
+
+
+def test_a_neighbour_that_is_not_found_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    def follow(self: TrackPasses, *given: Any) -> Any:
+        if self.parameters.friction != 0.2:
+            raise NotConverged("no pass was found")
+        return FOLLOW(self, *given)
+
+    monkeypatch.setattr(TrackPasses, "follow", follow)
+    by = ("friction", "yield_stress")
+    record = numbers(SCENES["rolling"], rolled(passes=1), by, ("axle_height", "residual_profile"))
+    names = "d_axle_height_d_friction, d_residual_profile_d_friction"
+    assert record.message == f"no derivative was found for {names}"
+    assert np.isnan(record.scalars["d_axle_height_d_friction"])
+    assert np.isfinite(record.scalars["d_axle_height_d_yield_stress"])
+    assert np.isfinite(record.fields["d_residual_profile_d_yield_stress"][1]).all()
+
+
+FOLLOW = TrackPasses.follow
 
 
 def test_a_size_of_the_elements_of_a_track_is_refused() -> None:

@@ -123,8 +123,7 @@ class RollingContact(AppliedLoad):
     normal, tangential : (n,) contact forces on the track; tangential forces are positive against
         the motion of the load [N]
     area : (n,) areas of the vertices' hats [mm2]
-    gap, slip : (n,) gap between track and rim, and slip while the axle advances by one element, NaN
-        if they do not face each other [mm]
+    gap : (n,) gap between track and rim, NaN if they do not face each other [mm]
     status : (n,) status of the contact points, as in `solver.contact.problem`
     bound : (n,) friction bound of the tangential forces [N]
     creepage : 1 + R d(rotation) / d(advance)
@@ -137,7 +136,6 @@ class RollingContact(AppliedLoad):
     tangential: Array
     area: Array
     gap: Array
-    slip: Array
     status: Ints
     bound: Array
     creepage: float
@@ -264,10 +262,10 @@ class RollingWheel(PassingLoad):
 
         every = np.zeros((2, len(surface.vertices)))
         every[:, geometry.at] = found.forces.reshape(2, -1)
-        gap, slip, bound = np.full((3, len(surface.vertices)), np.nan)
+        gap, bound = np.full((2, len(surface.vertices)), np.nan)
         bound[geometry.at] = problem.lines.least(found.forces[: len(geometry.at)])
         moved = problem.moved(found.forces, found.rigid)
-        gap[geometry.at], slip[geometry.at] = moved.reshape(2, -1)
+        gap[geometry.at] = moved[: len(geometry.at)]
         turns = self._drive is not None
         return RollingContact(
             force=self._nodal(known.on_track),
@@ -278,7 +276,6 @@ class RollingWheel(PassingLoad):
             tangential=every[1],
             area=geometry.area,
             gap=gap,
-            slip=slip,
             status=known.status,
             bound=bound,
             creepage=float(found.rigid[1]) / self._length if turns else self.load.creepage,

@@ -6,8 +6,6 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from solver.contact.state import BodyState
 from solver.materials.state import PlasticState
 from solver.results.stress_cycle import StressCycle
@@ -25,14 +23,12 @@ class PassStage:
     touching : the contact in the frame of the load, or None
     lowest : (n_components,) smallest stress components around the load, None if not known [MPa]
     found : the pass of a state under the load, if its cycle is not all in the state
-    near : as of a `Converged`, of a neighbouring run
     """
 
     state: BodyState
     touching: Any = None
     lowest: Array | None = None
     found: Any = None
-    near: float = np.inf
 
 
 class SteadyBody(ABC):

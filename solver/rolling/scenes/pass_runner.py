@@ -27,11 +27,7 @@ from solver.rolling.results.stage import SteadyBody
 from solver.scenes.scene import Monitor, Scene
 from solver.typing import Array
 
-_Family, nearest, distances = (
-    Late("solver.derivatives.family:Family"),
-    Late("solver.derivatives.switches:nearest"),
-    Late("solver.rolling.switches:distances"),
-)
+_Family = Late("solver.derivatives.family:Family")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +72,10 @@ class Passes(ABC):
         beside : the same pass of the other run
         last : the pass before, None for the first one
         """
+        raise NotImplementedError
+
+    def same_mesh(self, parameters: Any) -> bool:
+        """Return whether a run with other parameters can be followed on this mesh."""
         raise NotImplementedError
 
     @abstractmethod
@@ -166,7 +166,6 @@ class _Path:
         if scene.derivatives:
             self._family = _Family(scene.derivatives, scene, last)
         self._beside: list[_Path] = []
-        self._near = np.inf
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
 
@@ -186,22 +185,14 @@ class _Path:
             self._steps = self._state["steps"].astype(int).tolist()
         if begun := self._passes.begun:
             self._traces, self._left = begun.traces.copy(), begun.left
-        each = [self._last, *self._family.runs(self._last)] if self._family else []
+        each = []
+        if self._family:
+            self._family.keep_mesh(self._last, self._passes.same_mesh)
+            each = [self._last, *self._family.runs(self._last)]
         plain = replace(self._scene, derivatives=None)
         self._beside = [_Path(plain, parameters, self._window, None) for parameters in each]
         for other in self._beside:
             other._begin(reach)
-        names = self._family.steps(self._last) if self._family else ()
-        for name, other in zip(names, self._beside[1:], strict=True):
-            if not np.array_equal(other._mesh, self._mesh):
-                allowed = "must not change the mesh: derivatives are taken by it"
-                raise ModelError(name, getattr(self._last, name), allowed)
-
-    @property
-    def _mesh(self) -> Array:
-        """Positions of the nodes [mm]."""
-        body = cast("SteadyBody", self._passes.shown(0)[0].system)
-        return np.asarray(body.part.body.mesh.p)
 
     def _take(self, found: Pass[Any]) -> None:
         """Go on to a pass that is found."""
@@ -209,15 +200,15 @@ class _Path:
         self._found = found
         self._steps.append(max(found.steps, 1))
         self._traces.append(self._passes.trace(found))
-        last, switches = found, list[Array]()
-        try:
-            for other in self._beside:  # each begins where the one before it has ended
+        last = found
+        for other in self._beside:  # each begins where the one before it has ended
+            if other.error or self._beside[0].error:
+                continue
+            try:
                 last = other._passes.follow(last, other._found, len(self._steps) - 1)
                 other._take(last)
-                switches.append(distances(last))
-                other._near = min(other._near, nearest(switches[0], switches[-1]))
-        except NotConverged:
-            self._beside = []
+            except NotConverged as failure:
+                other.error = failure
 
     def runs(self, runs: Sequence[Any], monitor: Monitor, reach: float) -> Iterator[FinishedRun]:
         """Yield the runs whose passes are found; ``error`` is the reason if others are not.
@@ -255,7 +246,7 @@ class _Path:
         (samples, acting), points, beside = passes.shown(number), {}, None
         view, body = samples.view, cast("SteadyBody", samples.system)
         if found is not None and self.error is None:
-            loaded, left = body.under_load(found), replace(body.left_by(found), near=self._near)
+            loaded, left = body.under_load(found), body.left_by(found)
             points = {name: left if name == view.unloaded else loaded for name in view.stages}
             if (fields := passes.beside) is not None:
                 beside = partial(fields, found)

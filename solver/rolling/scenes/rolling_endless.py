@@ -29,6 +29,7 @@ from solver.rolling.audit.plane import audit_pass
 from solver.rolling.load import FULL_SLIP, PassingLoad, RollingLoad
 from solver.rolling.passing import EXACT, Pass, SolveBudget, passing
 from solver.rolling.plane.layers import Layers
+from solver.rolling.plane.lines import rim_elements, track_lines, wheel_nodes
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.track import Track, standing_pressure, track_of
 from solver.rolling.plane.wheel import Rim, RollingContact, RollingWheel
@@ -234,6 +235,19 @@ class TrackPasses(Passes):
                 beside.strain, start=beside.loading.start, parts=beside.parts, tolerance=EXACT,
             )  # fmt: skip
         return replace(found, direction=way)
+
+    def same_mesh(self, parameters: RollingParameters) -> bool:
+        """See `Passes`. Nodes of the wheel may move, but not become more or fewer."""
+        both = self.parameters, parameters
+        tracks = [track_lines(p.mesh_width, p.element_size, p.growth, self._reach) for p in both]
+        if not all(np.array_equal(*each) for each in zip(*tracks, strict=True)):
+            return False
+        if self.parameters.load == "hertz":
+            return True
+        sizes = [(p.widest.reach, p.element_size) for p in both]
+        wheels = [wheel_nodes(p.radius, *size) for p, size in zip(both, sizes, strict=True)]
+        one, other = ([len(nodes) for nodes in wheel] for wheel in wheels)
+        return one == other and rim_elements(*sizes[0]) == rim_elements(*sizes[1])
 
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
         """See `Passes`."""
