@@ -53,7 +53,7 @@ measured: setup ## compute, compare and draw what stands in docs/measured.md (5 
 bench: setup ## draw CPU time against error
 	$(BIN)/python -m tests.benchmarks
 
-stress: setup ## run a thousand seeded scenes, and see that none is answered wrongly (20 minutes)
+stress: setup ## run 2229 seeded scenes, and see that none is answered wrongly (hours)
 	$(BIN)/python -m tests.stability.estimates 39
 	$(BIN)/python -m tests.stability
 	RESIDUA_PARTS=$(OWN) $(BIN)/python -m tests.stability.slopes

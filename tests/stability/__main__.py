@@ -1,4 +1,4 @@
-"""``python -m tests.stability [NAME ...]``: a thousand scenes, or some of them.
+"""``python -m tests.stability [NAME ...]``: all seeded scenes, or some of them.
 
 One thread in each process, decided before any numerical library is loaded.
 """
