@@ -247,7 +247,7 @@ class GridLost(ConnectionError):
 def one_of(name: Any, names: Iterable[str], all_of: str = "") -> str:
     """Return what is allowed in place of `name`: one of `names`, the nearest of them last.
 
-    ``all_of`` tells what lists all, where some are left out.
+    ``all_of`` names what lists all, where some are left out.
     """
     known = list(dict.fromkeys(names))
     listed = ", ".join(cut(each, LONGEST_FIELD) for each in known[:MOST_NAMES])

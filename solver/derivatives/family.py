@@ -102,7 +102,7 @@ class Family:
         }
         each = [(output, output(runs[0])) for output in (_coordinates, *outputs)] if runs else []
         outputs = [output for output, own in each if {q.name for q in own} & {*self._asked.of}]
-        first = self._wanted(runs[0], outputs) if runs else {}
+        first = self._of([own for _, own in each])
         dims = {q.name: q.dims for _, own in each for q in own}  # a scene may add one to a quantity
         of_each = {named(of, by): dims[of] for by in self._asked.by for of in first}
         steps = self.steps(run.parameters)
@@ -117,8 +117,11 @@ class Family:
 
     def _wanted(self, run: FinishedRun, outputs: Iterable[Output]) -> dict[str, Any]:
         """Return the results of a run that are to be derived, of some outputs."""
-        each = (output(run).items() for output in outputs)
-        found = {q.name: value for values in each for q, value in values}
+        return self._of([output(run) for output in outputs])
+
+    def _of(self, each: Iterable[Values]) -> dict[str, Any]:
+        """Return those of some results that are to be derived."""
+        found = {q.name: value for values in each for q, value in values.items()}
         return {name: found[name] for name in self._asked.of if name in found}
 
     def _audit(
@@ -225,13 +228,12 @@ class IncrementalFamily(Family):
         """
         chance, number = divmod(crc32(repr(run.parameters).encode()), len(runs) - 1)
         by, step = list(self.steps(run.parameters).items())[number]
-        both, value = (runs[0], runs[1 + number]), getattr(run.parameters, by)
-        points = runs[0].outcome.points
+        value, points = getattr(run.parameters, by), runs[0].outcome.points
         stages = [name for name, own in points.items() if own.start is not own.state]
         at, errors = chance % max(len(stages), 1), list[float]()
         for stage in stages[at:] + stages[:at]:
             try:
-                alone = [self._alone(runs.index(own), own, run, stage) for own in both]
+                alone = [self._alone(k, runs[k], run, stage) for k in (0, 1 + number)]
             except IncrementFailed:
                 return {AUDITED: np.nan}
             first, after = (self._wanted(own, outputs) for own in alone)

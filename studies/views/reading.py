@@ -33,8 +33,6 @@ LATEST = "latest"
 _LOG = logging.getLogger("studies")
 _WIDEST = 60
 """Largest number of characters of an entry in which studies differ."""
-_FINISHED = "runs finished"
-"""End of what is told of a study whose runs can be read while it is computed."""
 _WAIT = 60.0
 """Timeout of a request to a service [s]."""
 
@@ -247,10 +245,11 @@ def find_datasets(path: Path | str) -> list[Path]:
     found = present_datasets(path)
     if not found:
         begun = begun_studies(path)
-        if any(each.partition(";")[0].endswith(_FINISHED) for each in begun):
-            there = f"residua view {_output(path)} shows the runs that are there"
-            begun += [f"{there}, and gives xarray.open_zarr its address with /studies/ID/zarr"]
-        allowed = "; ".join(begun) or "must be a data set, a study or an output directory"
+        lines = list(begun)
+        if shown := next(filter(None, begun.values()), None):
+            there = f"residua view {shown} shows the runs that are there"
+            lines += [f"{there}, and gives xarray.open_zarr its address with /studies/ID/zarr"]
+        allowed = "; ".join(lines) or "must be a data set, a study or an output directory"
         raise StudyError("path", str(path), allowed)
     return found
 
@@ -281,9 +280,10 @@ def _datasets(directory: Path, name: str) -> list[Path]:
     return [blobs.path(each) for each in found]
 
 
-def begun_studies(path: Path | str) -> list[str]:
+def begun_studies(path: Path | str) -> dict[str, Path | None]:
     """Return a line for each study in `path` (or `path` itself) that has no data set yet.
 
+    With it goes the output directory, if the runs that are there can be read: else None.
     The data set of a study is written when its computation ends, also after Ctrl-C.
     """
     path = Path(path).resolve()
@@ -292,17 +292,15 @@ def begun_studies(path: Path | str) -> list[str]:
     files = map(blobs.path, ["study.json", *sorted(blobs.names("studies/*/study.json"))])
     begun = [file for file in files if file.is_file() and file.parent.name not in there]
     begun = [file for file in begun if not file.with_name("dataset.nc").is_file()]
-    return [f"{_progress(file)}; no data set yet ({file.parent})" for file in begun]
+    each = ((*_progress(file), file) for file in begun)
+    return {
+        f"{line}; no data set yet ({file.parent})": file.parents[2] if readable else None
+        for line, readable, file in each
+    }
 
 
-def _output(path: Path | str) -> Path:
-    """Return the output directory of a study that has a directory there, or else the path."""
-    path = Path(path)
-    return path.parents[1] if path.parent.name == "studies" and is_id(path.name) else path
-
-
-def _progress(file: Path) -> str:
-    """Return the name of a study and the number of its finished runs."""
+def _progress(file: Path) -> tuple[str, bool]:
+    """Return the name of a study and the number of its finished runs; whether this is known."""
     study, store = None, Store(file.parents[2])
     try:
         content = seal.content_of(file, f"study {file.parent.name}")
@@ -311,10 +309,10 @@ def _progress(file: Path) -> str:
     except StudyError:  # such as a parameter that the scene no longer has
         pass
     except (FileDamaged, KeyError):
-        return f"{file.parent.name}: its {file.name} cannot be read"
+        return f"{file.parent.name}: its {file.name} cannot be read", False
     if study is None or study.id != file.parent.name:
-        return f"{name}: begun with another version of the solver"
+        return f"{name}: begun with another version of the solver", False
     if study.kind.chooses:
-        return f"{study.name}: the {study.kind.work} has not ended"
+        return f"{study.name}: the {study.kind.work} has not ended", False
     finished = len(store.modified(study.run_ids()))
-    return f"{study.name}: {finished} of {study.size} {_FINISHED}"
+    return f"{study.name}: {finished} of {study.size} runs finished", True
