@@ -244,7 +244,7 @@ def find_datasets(path: Path | str) -> list[Path]:
     """
     found = present_datasets(path)
     if not found:
-        begun = begun_studies(path)
+        begun = _begun(path)
         lines = list(begun)
         if shown := next(filter(None, begun.values()), None):
             there = f"residua view {shown} shows the runs that are there"
@@ -280,12 +280,16 @@ def _datasets(directory: Path, name: str) -> list[Path]:
     return [blobs.path(each) for each in found]
 
 
-def begun_studies(path: Path | str) -> dict[str, Path | None]:
+def begun_studies(path: Path | str) -> list[str]:
     """Return a line for each study in `path` (or `path` itself) that has no data set yet.
 
-    With it goes the output directory, if the runs that are there can be read: else None.
     The data set of a study is written when its computation ends, also after Ctrl-C.
     """
+    return list(_begun(path))
+
+
+def _begun(path: Path | str) -> dict[str, Path | None]:
+    """Return the lines of `begun_studies`, each with its output directory if runs can be read."""
     path = Path(path).resolve()
     blobs = blobs_at(path)
     there = {Path(name).parent.name for name in blobs.names("studies/*/dataset.nc")}
