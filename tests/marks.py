@@ -2,6 +2,9 @@
 
 ``solves`` is for tests that compute a state of a model, ``processes`` for tests that start another
 process, ``pages`` for tests that run the code of a page or an example, which may do both.
+
+In the folders `UNDIVIDED` a test without the mark ``divides`` solves in the increments that it
+gives, which takes half the time. In all others the program divides them as for its users.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +26,9 @@ FOLDERS = {
     "verification": ("solves",),
 }
 """Marks of all tests of a folder."""
+
+UNDIVIDED = ("solver", "verification")
+"""Folders whose tests need the mark ``divides``; all other tests have it."""
 
 EXPENSIVE = {
     "solves": ("solver.loading.increment.Increment.solve", "solver.rolling.search.passing"),
@@ -38,22 +45,43 @@ workers start in a thread, where a refusal would hang."""
 CHEAP = ("git", "uname")
 """Commands that any test may run: they report on project and machine in milliseconds."""
 
+ANY = 1.0
+"""Error of an increment, over the yield stress, that none has."""
+
 _START = subprocess.Popen.__init__
 
 
 def of_folder(path: Path) -> tuple[str, ...]:
     """Return the marks that a test file has by its folder."""
-    return FOLDERS.get(path.relative_to(HERE).parts[0], ())
+    folder = path.relative_to(HERE).parts[0]
+    return (*FOLDERS.get(folder, ()), *(() if folder in UNDIVIDED else ("divides",)))
 
 
 @contextmanager
 def allowed(marks: set[str]) -> Iterator[None]:
-    """Refuse to solve and to start processes, except as the marks of a test allow."""
+    """Refuse to solve, to divide increments and to start processes, except as marks allow."""
     with pytest.MonkeyPatch.context() as patch:
+        if "divides" not in marks and "solves" in marks:
+            undivided(patch)
         for mark in EXPENSIVE.keys() - marks if "pages" not in marks else ():
             for name in EXPENSIVE[mark]:
                 patch.setattr(name, refusal(mark))
         yield
+
+
+def undivided(patch: pytest.MonkeyPatch) -> None:
+    """Take the usual limit of the error of an increment from all that is solved."""
+    from solver.loading import stepper  # loads the solver
+
+    limit, make = stepper.INCREMENT_ERROR, stepper.Stepper.__init__
+
+    def given(own: Any, system: Any, control: Any, *arguments: Any) -> None:
+        if control.increment_error == limit:
+            control = replace(control, increment_error=ANY)
+        make(own, system, control, *arguments)
+
+    patch.setattr(stepper, "INCREMENT_ERROR", ANY)
+    patch.setattr(stepper.Stepper, "__init__", given)
 
 
 def refusal(mark: str) -> Callable[..., None]:

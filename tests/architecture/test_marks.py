@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver import Body, Material, Model, solve
+from solver import Amplitude, Body, Displacement, Material, Model, Stage, solve
 from solver.mesh import grid
 from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import steady_passes
 from tests.architecture.sources import PROJECT, ROOT, tracked
-from tests.marks import EXPENSIVE, FOLDERS, HERE, of_folder
+from tests.marks import EXPENSIVE, FOLDERS, HERE, UNDIVIDED, allowed, of_folder
 
 
 def pulled() -> object:
@@ -81,14 +81,35 @@ def test_a_page_may_do_both() -> None:
 
 def test_the_quick_check_leaves_out_every_mark() -> None:
     marks = {each.partition(":")[0] for each in PROJECT["tool"]["pytest"]["ini_options"]["markers"]}
-    assert marks == {*EXPENSIVE, "pages"}
+    assert marks == {*EXPENSIVE, "pages", "divides"}
     (left_out,) = re.findall(r'pytest .*-m "(.*)"', (ROOT / "Makefile").read_text())
-    assert set(left_out.split(" and ")) == {f"not {mark}" for mark in marks}
+    assert set(left_out.split(" and ")) == {f"not {mark}" for mark in marks - {"divides"}}
+
+
+@pytest.mark.solves
+@pytest.mark.divides
+def test_increments_are_divided_as_the_marks_say() -> None:
+    def increments() -> int:
+        """Return how many increments a stretched square takes whose flow turns."""
+        side, amplitude = np.linspace(0.0, 1.0, 2), Amplitude([0, 1, 2], [0, 1, 1])
+        body = Body(
+            name="square", mesh=grid(side, side), supports={"bottom": "xy"},
+            material=Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=200.0),
+            loads=(Displacement(boundary="top", y=0.004, amplitude=amplitude),
+                   Displacement(boundary="top", x=0.02, amplitude=Amplitude([1, 2], [0, 1]))),
+        )  # fmt: skip
+        stages = tuple(Stage(name=str(time), target=time, steps=1) for time in (1.0, 2.0))
+        return len(solve(Model(bodies=(body,)), stages=stages).tally.iterations)
+
+    divided = increments()
+    with allowed({"solves"}):
+        assert increments() == 2 < divided
 
 
 def test_marks_of_folders_are_known_and_their_folders_exist() -> None:
     assert {mark for marks in FOLDERS.values() for mark in marks} <= EXPENSIVE.keys()
     for folder, marks in FOLDERS.items():
-        assert of_folder(HERE / folder / "test_any.py") == marks
+        own = of_folder(HERE / folder / "test_any.py")
+        assert own == (marks if folder in UNDIVIDED else (*marks, "divides"))
         assert list((HERE / folder).glob("test_*.py"))
-    assert of_folder(HERE / "test_docs.py") == ()
+    assert of_folder(HERE / "test_docs.py") == ("divides",)

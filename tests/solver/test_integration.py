@@ -32,7 +32,7 @@ from tests.solver.back_stress_rules import BurletCailletaud, OhnoWang, Plain, Th
 ELASTIC = Elasticity(youngs_modulus=2e5, poisson_ratio=0.3)
 PLAIN = Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=300.0)
 LINEAR = replace(PLAIN, yield_stress=200.0, hardening="kinematic", hardening_ratio=0.024)
-pytestmark = pytest.mark.solves
+pytestmark = [pytest.mark.solves, pytest.mark.divides]
 GIVEN = PathControl(increment_error=np.inf)
 """Takes increments as they are given."""
 

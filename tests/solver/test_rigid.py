@@ -236,6 +236,7 @@ def test_models_with_bad_rigid_bodies_are_refused() -> None:
         pressed(body, replace(one, x=Pushed(value=1.0), y=Pushed(value=-1.0)))
 
 
+@pytest.mark.divides
 @pytest.mark.parametrize("steps", [1, 10])
 def test_a_ball_that_is_moved_comes_and_goes_in_any_number_of_increments(steps: int) -> None:
     x = graded(20.0, 0.1, 1.3, 5.0)

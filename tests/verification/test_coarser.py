@@ -29,6 +29,8 @@ from tests.verification.scene_files import (
     shear,
 )
 
+pytestmark = pytest.mark.divides
+
 CLAIMED = 0.05
 """Error of peaks, forces and creepage."""
 SHEAR = 1.25

@@ -27,6 +27,8 @@ from solver.loading import stepper
 from solver.mesh import graded, grid, mapped
 from solver.model.rigid import arc
 
+pytestmark = pytest.mark.divides
+
 STEEL = Material(youngs_modulus=2e5, poisson_ratio=0.3)
 RADIUS, FRICTION = 20.0, 0.3
 

@@ -13,6 +13,8 @@ from solver.results.record import Record
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene, read_scene
 
+pytestmark = pytest.mark.divides
+
 FILE = Path(__file__).parents[2] / "data/scenes/roller.toml"
 
 

@@ -86,7 +86,7 @@ def bent_bar() -> Any:
         kinematics="plane_stress", supports={"left": "xy"},
         pressure={"top": 12.0, "right": -200.0},
     )  # fmt: skip
-    return solve(Model(bodies=(bar,)), control=PathControl(load_step=0.2, increment_error=1.0))
+    return solve(Model(bodies=(bar,)), control=PathControl(load_step=0.2))
 
 
 def along_the_deviator(find: Any) -> Any:
