@@ -31,7 +31,7 @@ def pressed(friction: float, depth: float, steps: int) -> Solution:
     dent = ContactPair(slave=("strip", "top"), master=("ball", "face"), friction=friction)
     seat = ContactPair(slave=("strip", "bottom"), master=("anvil", "top"), friction=0.3)
     model = Model(bodies=(strip, anvil), rigid=(ball,), contacts=(dent, seat))
-    return solve(model, control=PathControl(load_step=1 / steps, increment_error=0.05))
+    return solve(model, control=PathControl(load_step=1 / steps))
 
 
 @pytest.mark.parametrize(("friction", "depth", "steps"), [(0.2, 0.02, 40), (0.5, 0.01, 20)])

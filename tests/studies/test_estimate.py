@@ -106,6 +106,7 @@ def test_the_pace_is_that_of_past_runs(store: Store, outliers: int) -> None:
 
 
 @pytest.mark.solves
+@pytest.mark.divides
 def test_own_scenes_take_as_long_as_estimated(tmp_path: Path) -> None:
     """18 of 20; `make stress` has more of them, with finer meshes too."""
     found = [timed(*each, tmp_path / str(k)) for k, each in enumerate(drawn(20))]
@@ -114,6 +115,7 @@ def test_own_scenes_take_as_long_as_estimated(tmp_path: Path) -> None:
 
 
 @pytest.mark.solves
+@pytest.mark.divides
 def test_a_scene_of_large_strain_takes_as_long_as_estimated(tmp_path: Path) -> None:
     """Its increments cost more, and are divided while the bar yields."""
     tables = tomllib.loads((ROOT / "data/scenes/neck.toml").read_text())

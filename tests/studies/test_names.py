@@ -98,6 +98,7 @@ FREE = [
 
 
 @pytest.mark.solves
+@pytest.mark.divides
 @pytest.mark.parametrize(
     ("kind", "keep"), [*zip(KINDS, ["", "fields"] * len(KINDS), strict=False), ("words", "")]
 )

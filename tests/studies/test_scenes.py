@@ -80,7 +80,7 @@ def records() -> list[Record]:
     found = []
     for label, (parameters, value) in coarse.items():
         name = names[label]
-        scene = replace(scene_named(name), increment_error=1.0)  # none is divided
+        scene = scene_named(name)
         if name in ("ball", "raceway"):
             scene = assessed(scene, FATIGUE)
         found += scene.path(scene.parameters(**parameters), [value], lambda fraction: None)

@@ -19,7 +19,7 @@ def test_a_scene_of_everything_is_ok_once_its_contacts_are_resolved(
     parts: int, turn: float
 ) -> None:
     """The file itself is coarse: its contacts are narrower than an element, which is told."""
-    tables = tomllib.loads(FILE.read_text()) | {"increment_error": 0.3}
+    tables = tomllib.loads(FILE.read_text())
     tables["rigid"]["plate"]["y"]["moved"] = -0.1
     tables["bodies"]["ring"]["shape"]["near"] = [
         {"at": [0, 10], "size": 0.1}, {"at": [0, -10], "size": 0.1},

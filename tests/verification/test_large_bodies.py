@@ -277,7 +277,7 @@ def test_large_strain_is_named_where_bodies_can_have_it(turns: bool) -> None:
 
 def test_a_cone_has_the_published_force_of_its_depth() -> None:
     """C = P / h^2 by M. Dao et al., Acta Mater. 49 (2001) 3899-3918, to the error of the mesh."""
-    cone = replace(scene_named("cone"), increment_error=0.3)
+    cone = scene_named("cone")
     own = {"accuracy": "draft", "youngs_modulus": 1e4, "yield_stress": 30.0, "unload_steps": 60}
     (record,) = cone.path(cone.parameters(**own), [1], lambda fraction: None)
     assert record.status is Status.OK
@@ -330,7 +330,7 @@ def test_the_scene_of_the_neck_has_the_force_and_the_radius_of_that_bar() -> Non
 def drawn(friction: float, size: float, *, through: bool = True) -> Record:
     """A mandrel drawn into a hole or through it, in increments that are as long as given."""
     file = ROOT / "data/scenes/mandrel.toml"
-    content = tomllib.loads(file.read_text(encoding="utf-8")) | {"increment_error": 0.3}
+    content = tomllib.loads(file.read_text(encoding="utf-8"))
     if not through:
         content["rigid"]["mandrel"]["y"]["amplitude"] = {"in": 0.5}
         content |= {
@@ -369,7 +369,7 @@ def test_a_mandrel_moves_through_a_hole_and_the_work_of_its_force_is_found_again
 )
 def test_all_laws_in_contact_agree_with_small_strain_where_strain_is_small(law: Any) -> None:
     """The half-space strains by less than 2 %: approaches differ by less, the audit passes."""
-    ball, found = replace(scene_named("ball"), increment_error=0.3), {}
+    ball, found = scene_named("ball"), {}
     for strain in ("small", "large"):
         own = {"accuracy": "draft", "load_ratio": 3.0, "load_step": 0.5, "strain": strain} | law
         (found[strain],) = ball.path(ball.parameters(**own), [1], lambda fraction: None)

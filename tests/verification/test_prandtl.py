@@ -15,7 +15,7 @@ from tests.verification.closed_forms import prandtl_pressure
 
 YIELD = 300.0
 EXACT = prandtl_pressure(YIELD)
-LONG = {"unload_steps": 1, "max_cuts": 6, "increment_error": 1.0}
+LONG = {"unload_steps": 1, "max_cuts": 6}
 """A limit load does not depend on the path: increments are cut where there is no equilibrium."""
 
 

@@ -32,7 +32,6 @@ def solved(parameters):
         control=PathControl(
             load_step=parameters.load_step,
             unload_steps=parameters.unload_steps,
-            increment_error=SCENES["punch"].increment_error,
         ),
     )
 

@@ -28,7 +28,7 @@ FREE = {
 """A law that the endless track asks from column to column, as increments do at their points."""
 LENGTHS = (64.0, 128.0, 256.0)
 YIELD = RollingParameters().yield_stress
-ENOUGH = Control(tolerances=Tolerances(residual=1e-4), increment_error=np.inf)
+ENOUGH = Control(tolerances=Tolerances(residual=1e-4))
 """With a residual of 1e-8, stress of a track of 100 mm is the same to 0.002 MPa."""
 AVERAGED = 1 / 20
 """Half the part of a track around its middle, over which stress is averaged / length."""

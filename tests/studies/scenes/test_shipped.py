@@ -59,6 +59,7 @@ def test_the_work_of_a_run_is_told_as_it_is(name: str, changes: dict[str, Any]) 
 
 
 @pytest.mark.solves
+@pytest.mark.divides
 @pytest.mark.parametrize(
     ("name", "changes", "values"),
     [
