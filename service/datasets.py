@@ -45,7 +45,7 @@ REST = 10.0
 SECONDS = 600.0
 """Longest time of making one [s]."""
 
-PATIENCE = 20.0
+PATIENCE = 50.0
 """Longest time that a request waits for one [s]; then the answer is to ask later."""
 
 LARGE = (

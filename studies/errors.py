@@ -299,14 +299,21 @@ _WORDS = {
     "string_too_long": "must have at most {max_length} characters",
     "too_short": "must have {min_length} or more",
     "too_long": "must have at most {max_length}",
-    "string_pattern_mismatch": "must match {pattern}",
 }
 """Type of a pydantic error -> what is allowed."""
+
+_FORMS = {
+    "^[0-9a-f]{32}$": "must be an id, 32 hexadecimal digits, as lists of the service have it",
+    r"^(/[\w.~-]+)*$": "must be a path such as /residua, or empty",
+}
+"""Pattern of a text -> what is allowed."""
 
 
 def worded(error: Mapping[str, Any]) -> str:
     """Return what is allowed for the input of a pydantic error."""
     words = _WORDS.get(error["type"])
+    if error["type"] == "string_pattern_mismatch":
+        return _FORMS.get(error["ctx"]["pattern"], str(error["msg"]))
     if error["type"] == "literal_error":
         known = [*filter(None, re.findall(r"'([^']*)'", error["ctx"]["expected"]))]
         return one_of(error["input"], known) if len(known) > 1 else f"must be {known[0]}"

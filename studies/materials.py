@@ -37,7 +37,7 @@ def parameters_in(material: Any) -> dict[str, Any]:
         allowed = "names a file, which only a study or scene file can: give a table of parameters"
         raise StudyError("", material, allowed)
     if material not in [*library()]:
-        raise StudyError("", material, one_of(material, [*library(), "FILE.toml#NAME"]))
+        raise StudyError("", material, one_of(material, [*library(), "FILE.toml#NAME", "a table"]))
     return named(material)
 
 

@@ -39,6 +39,8 @@ USUAL = "punch"
 """The scene of the form."""
 LISTED = 25
 """Number of posted scenes that it offers."""
+_FEW = 8
+"""Number of parameters up to which all are shown at once."""
 
 
 @router.get("/new")
@@ -166,6 +168,7 @@ def _form(
     fields = form.entries(scene, given, mistakes)
     posted = [(each.id, f"{each.name} (posted)") for each in store.scenes(LISTED)]
     choose = given.get("choose", [""])[0]
+    few = len(fields) <= _FEW
     own = {each.parameter.name for each in fields} | {"name"}
     tables = form.tables(given, mistakes)
     own |= {each.name for each in tables[choose][1]} if choose in tables else set()
@@ -179,8 +182,8 @@ def _form(
         scenes=[*((each.name, each.name) for each in known_scenes()), *posted],
         given={key: values[0] for key, values in given.items()},
         query_of=urlencode({**given, "scene": [name]}, doseq=True),
-        first=[each for each in fields if each.first],
-        rest=[each for each in fields if not each.first],
+        first=[each for each in fields if few or each.first],
+        rest=[each for each in fields if not (few or each.first)],
         tables=tables,
         wrong=mistakes,
         general=[text for key, text in mistakes.items() if key not in own],

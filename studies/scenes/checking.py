@@ -23,6 +23,8 @@ from studies.scenes.description import LARGEST
 from studies.scenes.names import RESERVED, in_use
 from studies.scenes.results import fatigue_of
 
+NO_FILE = "there is no such file beside the scene, or posted with it as meshes"
+
 
 def contradictions(scene: tables.SceneFile, meshes: Iterable[str] | None) -> Iterator[StudyError]:
     """Yield contradictions between entries, and names that do not exist.
@@ -163,7 +165,7 @@ def _bodies(scene: tables.SceneFile, meshes: set[str] | None) -> Iterator[StudyE
         if body.part is not None and body.mesh is None:
             yield StudyError(f"{where}.part", body.part, "needs mesh")
         if body.mesh is not None and meshes is not None and body.mesh not in meshes:
-            yield StudyError(f"{where}.mesh", body.mesh, "there is no such file beside the scene")
+            yield StudyError(f"{where}.mesh", body.mesh, NO_FILE)
         boxes: dict[str, tables.BoundaryTable | tables.CutTable | tables.RegionTable] = {}
         boxes |= {f"regions.{other}": box for other, box in body.regions.items()}
         boxes |= {f"boundaries.{other}": box for other, box in body.boundaries.items()}
@@ -191,7 +193,7 @@ def _loads(scene: tables.SceneFile, files: set[str] | None) -> Iterator[StudyErr
         yield from _one_of(f"loads[{k}].body", load.body, scene.bodies)
         for name, each in load.tabulated.items():
             if files is not None and each.file not in files:
-                allowed = "there is no such file beside the scene"
+                allowed = NO_FILE
                 yield StudyError(f"loads[{k}].{name}.file", each.file, allowed)
     amplitudes: list[tuple[str, tables.Amplitude | None]] = [
         (f"loads[{k}].{name}", given)
@@ -210,7 +212,7 @@ def _loads(scene: tables.SceneFile, files: set[str] | None) -> Iterator[StudyErr
             yield from _one_of(where, stage, names)
             file = getattr(course, "file", None)
             if file is not None and files is not None and file not in files:
-                allowed = "there is no such file beside the scene"
+                allowed = NO_FILE
                 yield StudyError(f"{where}.{stage}.file", file, allowed)
 
 

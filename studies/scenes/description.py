@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,12 +19,13 @@ from studies.materials import parameters_in, read_material
 from studies.scenes.arithmetic import ExpressionError, evaluated, is_expression, names
 from studies.scenes.meshfile import MeshFile
 from studies.scenes.quantities import in_own_units, wrong_units
-from studies.scenes.refusals import Where, dotted, mended, mistakes_of
+from studies.scenes.refusals import NUMBER, Where, dotted, mended, mistakes_of
 from studies.scenes.table import FILE_NAME
 from studies.scenes.tables import ACCURACY, NAMED, OPEN, ParameterTable, SceneFile
 from studies.toml import read_given, toml_of
 
-_NUMBER = "must be a number, or an expression with parameters as $name"
+_ARITHMETIC = re.compile(r"[+*/^()]|\s-\s")
+"""What makes a text of [derived] an expression also without a parameter."""
 PLAIN = ("name", "summary", "parameters", "derived", "accuracy", "advice")
 """Entries of a scene file without expressions of parameters, and the derived numbers."""
 
@@ -265,12 +267,13 @@ class Description:
         known = dict(values)
         for name, text in self._derived.items():
             where = ("derived", name)
-            value = _value(where, text, known, mistakes)
+            computed = isinstance(text, str) and where not in mistakes and _ARITHMETIC.search(text)
+            value = _value(where, text, known, mistakes, bool(computed))
             if name in values:
                 allowed = "is a parameter too: give it another name"
                 mistakes[where] = StudyError(dotted(where), text, allowed)
             elif where not in mistakes and not _is_value(value):
-                mistakes[where] = StudyError(dotted(where), text, _NUMBER)
+                mistakes[where] = StudyError(dotted(where), text, NUMBER)
             known[name] = None if where in mistakes else value
         plain = {key: value for key, value in self.content.items() if key in PLAIN}
         rest = {key: value for key, value in self.completed.items() if key not in PLAIN}
@@ -372,9 +375,14 @@ def _unconditional(where: Where, value: Any, known: Mapping[str, Any], mistakes:
     return rest
 
 
-def _value(where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes) -> Any:
-    """Return the value of an expression, or None if it or a parameter of it has none."""
-    if not is_expression(value):
+def _value(
+    where: Where, value: Any, known: Mapping[str, Any], mistakes: Mistakes, constant: bool = False
+) -> Any:
+    """Return the value of an expression, or None if it or a parameter of it has none.
+
+    A ``constant`` is an expression without parameters.
+    """
+    if not constant and not is_expression(value):
         return value
     if any(known.get(name, value) is None for name in names(value)):
         mistakes[where] = None

@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ValidationError
 
 from studies.errors import StudyError, nearest, one_of, worded
+from studies.units import is_quantity
 
+NUMBER = "must be a number, or an expression, which names parameters as $name"
 _KINDS = ("union_tag_not_found", "union_tag_invalid")
 
 _KEY = "[key]"
@@ -47,8 +49,11 @@ def _schema(table: type[BaseModel]) -> Mapping[str, Any]:
 
 def _either(allowed: list[str]) -> str:
     """Return what is allowed by any branch of a union."""
-    *others, last = (each.removeprefix("must be ") for each in allowed)
-    return f"must be {', '.join(others)} or {last}" if others else allowed[0]
+    if len(allowed) == 1:
+        return allowed[0]
+    each = ("a number" if text == NUMBER else text.removeprefix("must be ") for text in allowed)
+    *others, last = each
+    return f"must be {', '.join(others)} or {last}"
 
 
 def _loc(each: Any) -> Where:
@@ -70,6 +75,9 @@ def _allowed(each: Any, entries: list[str]) -> str:
         return listed + nearest(each["loc"][-1], entries)
     if kind in _KINDS:
         return one_of(_given(each), entries)
+    given = each["input"]
+    if kind == "float_type" and isinstance(given, str) and not is_quantity(given):
+        return NUMBER
     return worded(each)
 
 

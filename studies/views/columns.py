@@ -54,6 +54,8 @@ def unit_text(unit: Any) -> str:
 def counted(value: Any) -> str:
     """Return a list of points or tables, or the JSON of one, as their number; other text as is."""
     text = str(value)
+    if text == "[]":
+        return "none"
     if text.startswith("[[["):  # points, elements and lines of a section
         return "a mesh"
     if text.startswith("[["):

@@ -281,7 +281,7 @@ def _datasets(directory: Path, name: str) -> list[Path]:
 
 
 def begun_studies(path: Path | str) -> list[str]:
-    """Return a line for each study in `path` (or `path` itself) that has no data set yet.
+    """Return a line for each study at `path`, as for `find_datasets`, that has no data set yet.
 
     The data set of a study is written when its computation ends, also after Ctrl-C.
     """
@@ -291,11 +291,13 @@ def begun_studies(path: Path | str) -> list[str]:
 def _begun(path: Path | str) -> dict[str, Path | None]:
     """Return the lines of `begun_studies`, each with its output directory if runs can be read."""
     path = Path(path).resolve()
+    name, path = ("", path) if path.is_dir() else (path.name, path.parent)
     blobs = blobs_at(path)
     there = {Path(name).parent.name for name in blobs.names("studies/*/dataset.nc")}
     files = map(blobs.path, ["study.json", *sorted(blobs.names("studies/*/study.json"))])
     begun = [file for file in files if file.is_file() and file.parent.name not in there]
     begun = [file for file in begun if not file.with_name("dataset.nc").is_file()]
+    begun = [each for each in begun if each.parent.name.startswith(name) or _name(each) == name]
     each = ((*_progress(file), file) for file in begun)
     return {
         f"{line}; no data set yet ({file.parent})": file.parents[2] if readable else None

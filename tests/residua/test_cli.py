@@ -108,7 +108,8 @@ def test_show_tells_how_far_a_study_without_a_data_set_is(
     store.dataset_path(study.id).unlink()
     store.discard([next(study.cases()).id])
     store.save_study(later)
-    for path in (store.directory, store.study_path(study.id)):
+    named = [store.directory / study.name, store.directory / study.id[:8]]
+    for path in (store.directory, store.study_path(study.id), *named):
         assert main(["show", str(path)]) == 0
         told = capsys.readouterr().out
         assert "first: 3 of 4 runs finished; no data set yet" in told

@@ -88,11 +88,12 @@ def cell(page: Any, x: float, y: float) -> tuple[float, float]:
 def test_no_page_has_a_serious_barrier_or_is_wider_than_a_phone(
     context: Any, open_study_page: Any, service: Server, study: str
 ) -> None:
-    run, other, *_ = runs(service, study)
+    run, *_ = runs(service, study)
+    every = "&".join(f"run={each}" for each in runs(service, study))
     waited = {
         "/ui": "table.list",
         f"/ui/runs/{run}": DRAWN.format("map"),
-        f"/ui/compare?run={run}&run={other}": "table.differ",
+        f"/ui/compare?{every}": "table.differ",
         "/ui/new?scene=punch": "[data-estimate] dd",
         "/ui/health": ".tiles",
         "/ui/sign-in": "form.stack",
@@ -108,6 +109,8 @@ def test_no_page_has_a_serious_barrier_or_is_wider_than_a_phone(
             for cut in page.locator(WHOLE).all():
                 box = cut.bounding_box()
                 assert box is None or box["x"] + box["width"] < 380, page.url
+            for label in page.locator(".differ tbody th[scope=row]").all():
+                assert label.bounding_box()["width"] > 70.0
 
 
 def see(page: Any, *, dark: bool) -> None:
@@ -255,6 +258,16 @@ def test_runs_are_chosen_by_keys_and_compared(context: Any, service: Server, stu
         page.wait_for_url("**second=0**")
         see(page, dark=False)
         assert f"run={first}&run={last}" in page.url
+
+
+def test_numbers_over_words_are_marks_without_lines(context: Any, service: Server) -> None:
+    laws = {"name": "laws", "scene": "fake", "sweep": {"hardening": ["none", "isotropic"]}}
+    study_id = service.post(laws)
+    assert service.finished(study_id)["status"] == "successful"
+    with opened(context, f"{base(service)}/ui/studies/{study_id}") as page:
+        page.wait_for_selector("[data-chart=sweep] .scatterlayer .point")
+        drawn = page.evaluate("document.querySelector('[data-chart=sweep]').data[0]")
+        assert (drawn["mode"], drawn["x"]) == ("markers", ["none", "isotropic"])
 
 
 def test_charts_take_text_of_others_as_text(open_study_page: Any) -> None:

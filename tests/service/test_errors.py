@@ -177,7 +177,8 @@ def test_an_id_of_another_form_is_refused(service: Server, kind: str, name: str)
     )
     answer = service.client.get(url)
     assert answer.status_code in (404, 422)
-    problem(answer, answer.status_code)
+    for error in problem(answer, answer.status_code)["errors"]:
+        assert error["allowed"].startswith("must be an id, 32 hexadecimal digits")
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,9 @@ def test_a_browser_posts_a_scene_and_gets_the_form_of_its_studies(
     _, _, told = answer.text.partition("pin.toml is not taken:")
     assert told.count("<li>") > 1 and "mvoe" in told, "each mistake is told"
     assert 'action="/ui/scenes"' in answer.text, "another file can be posted at once"
-    assert service.client.get(f"/ui/new?scene={pin}").status_code == 200
+    form = service.client.get(f"/ui/new?scene={pin}").text
+    assert "p.clearance" in form and "more parameters" not in form
+    assert "more parameters" in service.client.get("/ui/new?scene=punch").text
 
 
 def test_the_form_of_a_study_has_a_picture_of_its_scene(service: Server, pin: str) -> None:

@@ -29,6 +29,7 @@ from studies.execution.executor import Limits
 from studies.execution.result import answered
 from studies.execution.run import _Work
 from studies.execution.task import PathTask, walk
+from studies.kinds import found_of
 from studies.kinds.goal.search import Goal, Search
 from studies.scenes.scene import read_scene
 from tests.marks import HERE
@@ -307,6 +308,9 @@ def test_the_data_set_has_what_was_found_over_the_axes(store: Store, scene: str)
     with open_study(store.directory) as dataset:
         assert dataset["load_ratio"].dims == ("friction", "hardening", "half_width")
         assert dataset["load_ratio"].attrs["units"] == "1"
+        assert dataset["tried_peak_contact_pressure"].attrs["units"] == "MPa"
+        (about,) = found_of(dataset).about
+        assert "at which peak contact pressure is 120 MPa;" in about
         for friction in SWEEP["friction"]:
             for width in SWEEP["half_width"]:
                 one = dataset.sel(friction=friction, half_width=width).squeeze()
@@ -374,7 +378,24 @@ def test_a_goal_may_be_the_limit_load_or_multiply_with_points(store: Store) -> N
     [
         ({"trouble": "raise"}, PRESSURE, "error", "the stiffness is gone"),
         ({"trouble": "bare"}, PRESSURE, "not_converged", "it comes before the goal: increment 3"),
-        ({}, PRESSURE | {"at": 1e4}, "missing", "is not reached: peak_contact_pressure = 420"),
+        (
+            {},
+            PRESSURE | {"first_above": 1e4},
+            "missing",
+            "is not reached: peak_contact_pressure = 420",
+        ),
+        (
+            {},
+            PRESSURE | {"at": 1e4},
+            "missing",
+            "420 at load_ratio = 4: it does not reach 10000 in between",
+        ),
+        (
+            {},
+            PRESSURE | {"at": 1.0},
+            "missing",
+            "420 at load_ratio = 4: it does not reach 1 in between",
+        ),
         ({}, PRESSURE | {"first_above": 1.0}, "missing", "has been passed"),
         (
             {"trouble": "limit"},

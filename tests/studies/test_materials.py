@@ -89,9 +89,9 @@ def test_a_command_takes_a_name() -> None:
 
 
 def test_an_unknown_material_is_refused_with_those_that_exist() -> None:
-    assert "parameters.material = 'Al-6016': must be one of rail-steel, Al-6061" in refused(
-        parameters={"material": "Al-6016"}
-    )
+    told = refused(parameters={"material": "Al-6016"})
+    assert "parameters.material = 'Al-6016': must be one of rail-steel, Al-6061" in told
+    assert "FILE.toml#NAME, a table" in told  # the latter over HTTP, which sends no files
     assert "sweep.material" in (text := refused(sweep={"material": ["Al-7075", "Al7075"]}))
     assert "did you mean Al-7075?" in text
     assert "occurs already" in refused(sweep={"material": ["Al-7075", "Al-7075"]})

@@ -178,10 +178,22 @@ def test_random_passes_of_every_seed_and_number_share_a_zone() -> None:
     assert one.half_width > geometry(widest).half_width
 
 
-def test_a_pass_that_does_not_fit_is_refused_with_its_position() -> None:
-    far = WheelRailParameters(sequence=({}, {"lateral_position": 8.0}))
-    with pytest.raises(ModelError, match=r"lateral_position = 8\.0: must leave the flange"):
-        geometry(far)
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"lateral_position": 8.0}, r"^lateral_position = 8\.0: must leave the flange"),
+        ({"sequence": ({}, {"lateral_position": 8.0})},
+         r"^sequence\[1\]\.lateral_position = 8\.0: must leave the flange"),
+        ({"sequence": ({},), "lateral_position": 8.0}, r"^lateral_position = 8\.0: must leave"),
+        ({"lateral_spread": 4.0},
+         r"^lateral_spread = 4\.0: takes passes to lateral_position = 4\.0: must leave the"),
+    ],
+)  # fmt: skip
+def test_a_pass_that_does_not_fit_is_refused_with_what_gives_its_position(
+    given: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(ModelError, match=told):
+        geometry(WheelRailParameters(**given))
 
 
 # -- random traffic -------------------------------------------------------------------------------

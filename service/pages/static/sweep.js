@@ -237,7 +237,7 @@ function lines(what, shown) {
   const some = rows.length > rules.most_lines ? rows.filter((_, j) => j % Math.ceil(rows.length / rules.most_lines) === 0) : rows;
   const keys = y?.number ? ordered(some.length) : KEYS();
   const traces = some.map((row, k) => ({
-    type: "scatter", mode: "lines+markers", x: xs, y: row.map((run) => value(run, what)), customdata: row, text: row.map((run) => hover(run, what)),
+    type: "scatter", mode: x.number ? "lines+markers" : "markers", x: xs, y: row.map((run) => value(run, what)), customdata: row, text: row.map((run) => hover(run, what)),
     name: y ? plain(unit(said(y, rows.indexOf(row)), y)) : "", hovertemplate: "%{text}<extra></extra>", showlegend: Boolean(y),
     line: { color: keys[k % keys.length], width: 2, dash: k < keys.length ? "solid" : "dash" }, marker: { size: row.length > 60 ? 3 : 7 },
   }));

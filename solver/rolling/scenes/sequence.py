@@ -57,6 +57,27 @@ def block_of(
     return tuple(block)
 
 
+def as_given(parameters: Any, error: ModelError) -> ModelError:
+    """Return an error of a pass that names what gives it its value: its entry, or the spread.
+
+    Parameters
+    ----------
+    parameters : of the run
+    error : it names a parameter of a pass, and its value
+    """
+    name, value = error.field, error.value
+    each = {id(own): own for own in parameters.block}.values()  # one for each entry
+    for number, (entry, own) in enumerate(zip(parameters.sequence, each, strict=False)):
+        if name in entry and getattr(own, name) == value:
+            return ModelError(f"sequence[{number}].{name}", value, error.allowed)
+    spread = getattr(parameters, "lateral_spread", 0.0)
+    if not spread or name != "lateral_position" or value == parameters.lateral_position:
+        return error
+    return ModelError(
+        "lateral_spread", spread, f"takes passes to {name} = {value}: {error.allowed}"
+    )
+
+
 def _times(value: Any) -> int:
     """Return the number of passes of an entry."""
     if not is_number(value) or not 1 <= value <= _MOST or value != int(value):

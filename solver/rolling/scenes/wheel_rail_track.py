@@ -20,6 +20,7 @@ from solver.rolling.rail.straight import SettledStress, StraightPrism, check_ela
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.initial_stress import NoStress, SectionStress
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
+from solver.rolling.scenes.sequence import as_given
 from solver.rolling.scenes.wheel_rail import Points, WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import (
     canted,
@@ -83,9 +84,16 @@ def geometry(parameters: WheelRailParameters, reach: float = 1.0) -> RailGeometr
     Raises
     ------
     ModelError
-        for ``lateral_position``, if the contact is on the side of the head, or at the end of the
-        wheel's profile
+        for ``lateral_position``, of the run or of an entry of its sequence, or for the spread that
+        leads there, if the contact is on the side of the head, or at the end of the wheel's profile
     """
+    try:
+        return _geometry(parameters, reach)
+    except ModelError as error:
+        raise as_given(parameters, error) from None
+
+
+def _geometry(parameters: WheelRailParameters, reach: float) -> RailGeometry:
     p, contact = parameters, expected_contact(parameters)
     h, section = p.element_size, rail_of(p)
 

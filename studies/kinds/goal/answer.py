@@ -10,6 +10,7 @@ import numpy as np
 from solver.results.shakedown import ShakedownState
 from studies.definition.cases import Case
 from studies.definition.identity import canonical
+from studies.definition.quantity import number_of_a_run
 from studies.definition.study import Study
 from studies.definition.vocabulary import (
     ERROR,
@@ -50,6 +51,10 @@ def _outcome(study: Study, search: Search) -> tuple[str, str]:
             reason,
             f"at {name} = {search.high:.6g}{before}: {search.rows[search.high]['message']}",
         )
+    if reason == NEVER and goal.kind == "at":
+        each = [f"{search.look(end).value:.6g} at {name} = {end:.6g}" for end in goal.between]
+        never = f"it does not reach {goal.threshold:.6g} in between"
+        return MISSING, f"{goal.of} is {' and '.join(each)}: {never}"
     if reason == NEVER:
         return MISSING, f"at {name} = {last:.6g} the goal is not reached{_number(search, last)}"
     if reason == ALREADY and search.look(first).status in NO_EQUILIBRIUM:
@@ -130,12 +135,19 @@ def _content(
     for end in ("low", "high"):
         words = {"long_name": f"id of the run at the {end} end"}
         add(f"run_{end}", [_run(each, getattr(each, end)) for each in searches], object, words)
-    variables |= _tried(searches, tuple(axes), shape, {**unit, **beside})
+    units = {name: unit}
+    if goal.of:
+        units[goal.of] = {"units": number_of_a_run(goal.of, scene)[0]}
+    variables |= _tried(searches, tuple(axes), shape, units, beside)
     return variables
 
 
 def _tried(
-    searches: list[Search], dims: tuple[str, ...], shape: tuple[int, ...], attrs: Mapping[str, Any]
+    searches: list[Search],
+    dims: tuple[str, ...],
+    shape: tuple[int, ...],
+    units: Mapping[str, Mapping[str, str]],
+    beside: Mapping[str, str],
 ) -> dict[str, Variable]:
     """Return the runs of the searches: value of the parameter, number, status and id."""
     goal = searches[0].goal
@@ -154,7 +166,7 @@ def _tried(
     found = {"tried": Variable(("tried",), np.arange(most), {"long_name": "number of the run"})}
     for key, values in tried.items():
         words = {"long_name": f"{key.replace('_', ' ')} of the runs of the search"}
-        own = {**words, **(attrs if key == goal.parameter else {})}
+        own = {**words, **units.get(key, {}), **(beside if key == goal.parameter else {})}
         found[f"tried_{key}"] = Variable((*dims, "tried"), values.reshape(*shape, most), own)
     return found
 

@@ -27,7 +27,9 @@ def found(dataset: xr.Dataset, goal: Mapping[str, Any]) -> Found:
     low, high = map(value_text, goal["between"])
     within = f"bracket at most {value_text(100.0 * goal['within'])} % of its upper end"
     return Found(
-        about=[f"The {plain(name)} from {low} to {high} at which {_reached(goal)}; {within}."],
+        about=[
+            f"The {plain(name)} from {low} to {high} at which {_reached(goal, dataset)}; {within}."
+        ],
         headings=[*cells.headings[:at], *more, *cells.headings[at:]],
         units=[*cells.units[:at], *([""] if more else []), *cells.units[at:]],
         rows=rows,
@@ -36,13 +38,15 @@ def found(dataset: xr.Dataset, goal: Mapping[str, Any]) -> Found:
     )
 
 
-def _reached(goal: Mapping[str, Any]) -> str:
+def _reached(goal: Mapping[str, Any], dataset: xr.Dataset) -> str:
     """Return in words when a goal is reached."""
     if not goal.get("of"):
         return "there is no equilibrium any more"
     words = {"at": "is", "first_above": "is above", "first_below": "is below"}
     kind = next(each for each in words if each in goal)
-    return f"{plain(goal['of'])} {words[kind]} {value_text(goal[kind])}"
+    unit = dataset[f"tried_{goal['of']}"].attrs.get("units", "1")
+    measured = value_text(goal[kind]) if unit == "1" else f"{value_text(goal[kind])} {unit}"
+    return f"{plain(goal['of'])} {words[kind]} {measured}"
 
 
 def _places(dataset: xr.Dataset, name: str) -> list[Mark]:

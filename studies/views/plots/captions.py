@@ -18,7 +18,7 @@ from studies.definition.parameters import build, defaults, parameters_of, plain
 from studies.materials import MATERIAL
 from studies.numbers import number_text
 from studies.scenes.registry import scene_of
-from studies.storage.frame import FRACTION
+from studies.storage.frame import FRACTION, SETS
 from studies.views.columns import COMPUTED, computed_text, counted
 from studies.views.columns import plain as in_words
 from studies.views.picking import flags
@@ -106,7 +106,7 @@ def setting(run: xr.Dataset) -> str:
 
     These are its values on the axes of the sweep, and the parameters that differ from the scene's
     defaults. The two-dimensional state and the yield stress are always named. A material of the
-    library stands for its parameters.
+    library, or of an axis, stands for its parameters.
     """
     scene = run.attrs["scene"]
     known = parameters_of(scene_of(run.attrs))
@@ -115,6 +115,8 @@ def setting(run: xr.Dataset) -> str:
     own = {name: computed_text(value, _computed(run, name)) for name, value in given.items()}
     values = _values(run, given)
     idle, material = _idle(run, values), _material(values)
+    if MATERIAL in run.coords:
+        idle |= {*run[MATERIAL].attrs.get(SETS, "").split()}
     made = {*named_material(material)} if material else set()
     plane = given.get("state")
     state = [words(plane)] if isinstance(plane, str) and "state" not in run.coords else []

@@ -200,7 +200,8 @@ def _drawn(
     if INCREMENT in values.dims and TIME in run:
         values = values.assign_coords({TIME: run[TIME]})  # of several runs each has its own
     if against is not None:
-        values = values.assign_coords({AGAINST: _other(run, values, against)})
+        other = _other(run, values, against)
+        values = values.where(other.notnull()).assign_coords({AGAINST: other})
     for name in values.dims:
         values = values.dropna(name, how="all")
     if not values.size:
@@ -249,7 +250,7 @@ def _other(run: xr.Dataset, values: xr.DataArray, name: str) -> xr.DataArray:
     else:
         for each in [each for each in other.dims if each not in values.dims]:
             other = _moved(other, other[each].to_numpy().tolist(), str(each))
-        parts = [str(other[PART].item())] if PART in other.coords else []
+        parts = [str(other[PART].item())] if PART in {*other.coords} - {*other.dims} else []
     long_name = str(other.attrs.get("long_name", words(name)))
     if parts:
         long_name = f"{long_name} ({', '.join(dict.fromkeys(parts))})"

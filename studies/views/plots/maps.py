@@ -20,8 +20,10 @@ from matplotlib.tri import Triangulation
 
 from solver.model.friction import PatchStatus
 from solver.tensors import AXES, PRINCIPAL, principal_of
+from studies.definition.parameters import parameters_of
 from studies.errors import StudyError
 from studies.numbers import number_text
+from studies.scenes.registry import scene_of
 from studies.views.columns import COMPUTED
 from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
@@ -44,6 +46,8 @@ BELOW = -40.0
 """Place of words below a map, under the name of its axis [pt]."""
 _WHEEL, _UP, _OVER = "wheel_surface", "y", 3.0
 """The profile of the wheel, its height, and how far above the body it is shown [mm]."""
+_PASS, _OF_A_PASS = "pass", "pass_"
+"""The dimension of passes, and what stands before a parameter that each of them has for itself."""
 
 
 def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
@@ -407,6 +411,8 @@ def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> 
     quantity = values.attrs.get("long_name", str(values.name))
     shown = values.drop_vars("component", errors="ignore").to_dataset(name="values")
     shown = shown.assign({n: each for n, each in run.items() if str(n).startswith(COMPUTED)})
+    if is_patch(values, run):
+        shown = shown.assign_coords(_last_pass(run))
     below = axes.set_title(
         wrapped(setting(shown.assign_attrs(run.attrs)), width, 8),
         loc="left", fontsize=8, color="0.3", pad=_ABOVE,
@@ -416,6 +422,15 @@ def entitle(axes: Axes, run: xr.Dataset, values: xr.DataArray, width: float) -> 
         xycoords=below,
         xytext=(0.0, 5.0), textcoords="offset points", weight="bold", fontsize=11,
     )  # fmt: skip
+
+
+def _last_pass(run: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return the pass whose contact is stored, and what it has for itself; {} if all are alike."""
+    each = {str(n).removeprefix(_OF_A_PASS): run[n] for n in run if str(n).startswith(_OF_A_PASS)}
+    own = {n: each[n] for n in each.keys() & parameters_of(scene_of(run.attrs))}
+    if not any(np.ptp(value.to_numpy()) > 0.0 for value in own.values()):
+        return {}
+    return {name: value.isel({_PASS: -1}) for name, value in ({_PASS: run[_PASS]} | own).items()}
 
 
 def _symbol(coordinate: xr.DataArray) -> str:

@@ -89,15 +89,10 @@ def meaning(dataset: xr.Dataset, field: str) -> str:
     return capitalised(dataset[field].attrs.get("long_name", words(field)))
 
 
-def setting_of(dataset: xr.Dataset, width: float) -> str:
-    """Return what the runs of a study have in common, in lines of `width` inches."""
-    single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
-    return wrapped(setting(dataset.squeeze(single)), width, 8)
-
-
 def head_of(sheet: Figure, dataset: xr.Dataset, field: str) -> None:
-    """Write what is drawn of a study at the top of a figure of several panels."""
-    below = setting_of(dataset, sheet.get_size_inches()[0] - 0.4)
+    """Write what is drawn of a study at the top of a figure, and what its runs have in common."""
+    single = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] == 1]
+    below = wrapped(setting(dataset.squeeze(single)), sheet.get_size_inches()[0] - 0.4, 8)
     add_head(sheet, meaning(dataset, field), below)
 
 

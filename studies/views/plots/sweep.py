@@ -48,9 +48,7 @@ from studies.views.plots.sheets import (
     colours_of,
     head_of,
     is_number,
-    meaning,
     plain_axes,
-    setting_of,
 )
 from studies.views.rules import MOST_LINES
 
@@ -73,8 +71,6 @@ _LEGEND, _BAR = 3.2, 1.6
 _MARKS = "osD^vPh*"
 _CURVES = (8.0, 4.6)
 """Width and height of a figure of curves [in]."""
-_LEFT = 0.9
-"""Width of the labels left of the axes, where the caption of curves begins [in]."""
 _LETTERS = 60
 """Largest number of letters of horizontal labels."""
 _FOOT = 0.03
@@ -296,9 +292,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
     axes.set_xlabel(capitalised(short_label(across)))
     if others or missing:
         add_legend(axes, [words(str(each.name)) for each in others])
-    below = setting_of(dataset, _CURVES[0] - _LEFT)
-    axes.set_title(below, loc="left", fontsize=8, color="0.3")
-    sheet.suptitle(meaning(dataset, field), x=0.01, ha="left", fontsize=11, weight="bold")
+    head_of(sheet, dataset, field)
     return sheet
 
 

@@ -96,6 +96,16 @@ def test_a_force_of_contact_lies_over_the_motion_of_its_own_body() -> None:
         picture(run, "force", against="motion", selection={"part": "one"})
 
 
+def test_a_force_of_each_body_lies_over_the_motion_of_the_same_body() -> None:
+    run = course(2, 2)
+    run["reaction"] = run["motion"].copy(data=np.cos(run["motion"])).assign_attrs(units="N")
+    sheet = picture(run, "reaction", against="motion")
+    for loop in (line for line in lines_of(sheet) if line.get_marker() != "o"):
+        np.testing.assert_allclose(loop.get_ydata(), np.cos(loop.get_xdata()))
+    assert sheet.axes[0].get_xlabel() == "motion [mm]"
+    assert legend_of(sheet) == ["part 0", "part 1"]
+
+
 def cycled() -> xr.Dataset:
     """A study of two runs with three cycles and with two."""
     run = course(1).assign_coords(cycle=[1, 2, 3])

@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.contour import QuadContourSet
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from residua.cli import main
 from studies import StudyError
@@ -244,17 +245,16 @@ def test_an_axis_whose_points_differ_in_words_too_is_named_by_its_labels() -> No
     assert legend_of(sweep_figure(dataset, "increments")) == ["A", "B"]
 
 
-def test_a_long_caption_ends_within_the_sheet() -> None:
+@pytest.mark.parametrize("field", ["increments", "shakedown_state"])
+def test_a_long_caption_ends_within_the_sheet(field: str) -> None:
     dataset = swept(frictions=[0.1])
+    words = {"flag_values": [0, 1], "flag_meanings": "elastic a_state_of_many_words"}
+    dataset["shakedown_state"] = (dataset["increments"] > 20.0).astype(int).assign_attrs(words)
     dataset.attrs["parameters"] = json.dumps(
         {"half_width": 43.5, "punch_height": 123.5, "half_plane_size": 512.5, "growth": 2.125,
          "smallest_element": 0.0215, "yield_stress": 512.5}
     )  # fmt: skip
-    sheet = sweep_figure(dataset, "increments")
+    sheet = sweep_figure(dataset, field)
     sheet.canvas.draw()
-    (caption,) = [
-        each
-        for each in sheet.axes[0].get_children()
-        if "growth" in getattr(each, "get_text", str)()
-    ]
+    (caption,) = [each for each in sheet.findobj(Text) if "growth" in each.get_text()]
     assert caption.get_window_extent().x1 <= sheet.bbox.x1

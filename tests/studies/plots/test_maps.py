@@ -544,6 +544,9 @@ def test_a_caption_names_the_steel_also_if_it_is_the_usual_one() -> None:
     swept = xr.Dataset(attrs={"scene": "punch", "parameters": json.dumps(steel)})
     swept = swept.assign_coords(yield_stress=((), steel["yield_stress"], {"units": "MPa"}))
     assert f"yield stress {steel['yield_stress']:g}" in setting(swept).replace("\xa0", " ")
+    swept = swept.assign_coords(material=((), "own", {"sets": "yield_stress"}))
+    assert "material own" in (words := setting(swept).replace("\xa0", " "))
+    assert "yield stress" not in words
 
 
 def test_a_caption_leaves_out_the_load_of_a_run_whose_passes_have_their_own() -> None:
@@ -552,6 +555,21 @@ def test_a_caption_leaves_out_the_load_of_a_run_whose_passes_have_their_own() ->
     attrs = {"scene": "wheel_rail", "parameters": json.dumps(given)}
     words = setting(xr.Dataset(attrs=attrs)).replace("\N{NO-BREAK SPACE}", " ")
     assert words.endswith("traction 0.2 · sequence 2 tables") and "110" not in words
+
+
+def test_the_caption_of_a_contact_names_the_pass_that_it_is_of() -> None:
+    run = rolled().assign_coords({"pass": [1, 2]})
+    run.attrs |= {"scene": "wheel_rail", "parameters": '{"load": 110e3, "passes": 2}'}
+    run["pass_load"] = ("pass", [11e4, 35e3], {"units": "N"})
+    run["pass_traction"] = ("pass", [0.0, 0.1], {"units": "1"})
+
+    def told(field: str) -> str:
+        return " ".join(texts_of(map_figure(run, field)).split())
+
+    assert all(each in told("patch_pressure") for each in ("pass 2", "load 35000 N", "n 0.1"))
+    assert "load 110000 N" in told("map_mises") and "pass 2" not in told("map_mises")
+    run["pass_load"], run["pass_traction"] = run["pass_load"] * 0.0, run["pass_traction"] * 0.0
+    assert "load 110000 N" in told("patch_pressure") and "pass 2" not in told("patch_pressure")
 
 
 def test_a_section_is_drawn_with_the_wheel_above_it() -> None:

@@ -54,7 +54,7 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
     "text for a number": (
         put("contacts", 0, "friction", "high"),
         "contacts[0].friction",
-        "must be a number",
+        "must be a number, or an expression, which names parameters as $name",
     ),
     "number out of range": (
         put("contacts", 0, "friction", -1.0),
@@ -123,6 +123,11 @@ MISTAKES: dict[str, tuple[Callable[[Tables], object], str, str]] = {
         lambda t: t.update(derived={"side": "$sid"}),
         "derived.side",
         "$sid is no parameter",
+    ),
+    "derived number of a parameter without its sign": (
+        lambda t: t.update(derived={"side": "3 - (1 - wide)"}),
+        "derived.side",
+        "wide is unknown: write $wide for a parameter",
     ),
     "list for a default": (
         put("parameters", "wide", "default", [3.0]),

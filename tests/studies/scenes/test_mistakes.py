@@ -130,6 +130,16 @@ def leaves(tree: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
             yield (*at, key)
 
 
+def test_a_derived_constant_needs_no_parameter() -> None:
+    tables = blocks()
+    tables["contacts"][0]["cohesion"] = "$twentieth"
+    tables["derived"]["twentieth"] = "1/20"
+    built(tables)
+    tables["derived"]["twentieth"] = "-1/20"
+    with pytest.raises(SceneError, match=r"cohesion = -0\.05: must be at least 0"):
+        built(tables)
+
+
 @pytest.mark.parametrize("wrong", ["$nothing", {"wrong": 1}], ids=["expression", "table"])
 @pytest.mark.parametrize("where", list(leaves(EVERYTHING)), ids=dotted)
 def test_any_wrong_entry_is_told_by_itself_and_alone(where: tuple[Any, ...], wrong: Any) -> None:

@@ -35,7 +35,8 @@ def read_points(path: str | Path) -> Array:
     try:
         text = read_file(path).decode()
     except (OSError, UnicodeDecodeError) as error:
-        raise ModelError("file", str(path), f"must be a readable text file: {error}") from None
+        reason = "there is none" if isinstance(error, FileNotFoundError) else error
+        raise ModelError("file", str(path), f"must be a readable text file: {reason}") from None
     lines = [line.replace(",", " ").split() for line in text.splitlines()]
     units = {unit.strip() for unit in re.findall(r"\[([^]]*)\]", text.partition("\n")[0])} or {"mm"}
     if len(units) > 1 or not units <= _LENGTHS.keys():
