@@ -18,7 +18,8 @@ from solver.rolling.load import RollingLoad
 from solver.rolling.passing import passing
 from solver.rolling.rail.patch_contact import EllipticPatch
 from solver.rolling.scenes.raceway import MOST_LONG, HertzEllipse, RacewayParameters
-from solver.rolling.scenes.raceway_setup import RolledRaceway, geometry, track_of
+from solver.rolling.scenes.raceway_setup import geometry, load_on, prism, track_of, view
+from solver.rolling.scenes.rail_passes import RailPasses
 from solver.shipped import SCENES
 from tests.records import kept
 from tests.verification import closed_forms
@@ -196,9 +197,9 @@ def test_the_scene_is_a_pass_of_the_given_ellipse() -> None:
 def test_all_passes_have_one_load_so_that_each_begins_with_the_strain_of_the_last(
     load: Literal["hertz", "contact"],
 ) -> None:
-    raceway = RolledRaceway(SCENE.parameters(accuracy="draft", load=load, passes=2))
-    track = raceway.track(1.0)
-    assert raceway.load(track, 0) is raceway.load(track, 1)
+    parameters = SCENE.parameters(accuracy="draft", load=load, passes=2)
+    passes = RailPasses(prism, load_on, parameters, view(parameters), 1.0)
+    assert passes.load(0) is passes.load(1)
 
 
 def test_a_locked_ball_slips_everywhere_and_drags_the_raceway() -> None:

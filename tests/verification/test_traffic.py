@@ -11,10 +11,11 @@ import pytest
 from solver import ModelError, Record
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
+from solver.rolling.scenes.rail_passes import RailPasses
 from solver.rolling.scenes.sequence import CUT, deviations
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact
-from solver.rolling.scenes.wheel_rail_setup import RolledRail
+from solver.rolling.scenes.wheel_rail_setup import load_on, prism, view
 from solver.rolling.scenes.wheel_rail_track import geometry
 from solver.shipped import SCENES
 from tests.records import kept
@@ -99,21 +100,20 @@ def test_wheels_share_the_influences_of_the_rail() -> None:
     """They depend on the elasticity of the wheel alone, and the load is that of one made anew."""
     conical = {"wheel_profile": "conical", "lateral_position": 1.0, "wheel_radius": 500.0}
     both = WheelRailParameters(**USUAL, passes=2, sequence=({}, conical))
-    rail = RolledRail(both)
-    track = rail.track(1.0)
-    first, second = (rail.load(track, number) for number in (0, 1))
+    track, passes = prism(both, 1.0), RailPasses(prism, load_on, both, view(both), 1.0)
+    first, second = (passes.load(number) for number in (0, 1))
     assert second._influence is first._influence
-    alone = RolledRail(WheelRailParameters(**USUAL, **conical)).load(track, 0)
+    alone = load_on(track, WheelRailParameters(**USUAL, **conical))
     u = np.zeros((track.grid.stations, len(track.grid.z), 3))
     np.testing.assert_array_equal(second.solve(u).traction, alone.solve(u).traction)
 
 
 def test_wheels_in_turn_may_push_with_different_lateral_forces() -> None:
     pushed = [{"lateral_control": "force", "given_lateral_force": force} for force in (0.0, 5e3)]
-    rail = RolledRail(WheelRailParameters(**USUAL, passes=2, sequence=tuple(pushed)))
-    track = rail.track(1.0)
+    both = WheelRailParameters(**USUAL, passes=2, sequence=tuple(pushed))
+    track, passes = prism(both, 1.0), RailPasses(prism, load_on, both, view(both), 1.0)
     u = np.zeros((track.grid.stations, len(track.grid.z), 3))
-    found = [rail.load(track, number).solve(u).force[2] for number in (0, 1)]
+    found = [passes.load(number).solve(u).force[2] for number in (0, 1)]
     np.testing.assert_allclose(found, [0.0, 5e3], atol=1.0)
 
 

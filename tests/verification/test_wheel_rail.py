@@ -18,7 +18,7 @@ from solver.rolling.rail.track import PrismField
 from solver.rolling.scenes.initial_stress import RollerStraightened
 from solver.rolling.scenes.wheel_rail import ELEMENT_SIZE, WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact
-from solver.rolling.scenes.wheel_rail_setup import RolledRail
+from solver.rolling.scenes.wheel_rail_setup import load_on
 from solver.rolling.scenes.wheel_rail_track import geometry, section_of, track_of
 from solver.shipped import SCENES
 from tests.records import kept
@@ -69,7 +69,7 @@ def test_the_rail_clamped_as_the_published_one_sinks_and_turns_as_it() -> None:
     for span in (2400.0, "endless"):
         parameters = SCENE.parameters(**PUBLISHED, span=span)
         track = track_of(geometry(parameters))
-        load = RolledRail(parameters).load(track, 0)
+        load = load_on(track, parameters)
         contact = load.solve(np.zeros((track.grid.stations, len(track.grid.z), 3)))
         moved = track.beneath(PrismField(track, traction=contact.traction))
         node, axis = np.divmod(track.modes.unknowns, 3)

@@ -19,7 +19,7 @@ from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.rail_passes import contact_of
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
-from solver.rolling.scenes.wheel_rail_setup import RolledRail
+from solver.rolling.scenes.wheel_rail_setup import load_on
 from solver.rolling.scenes.wheel_rail_track import geometry, track_of
 from tests.verification.stepped_patch import SteppedPatch
 from tests.verification.stepped_prism import SteppedIncrement, SteppedPrism
@@ -39,7 +39,7 @@ def rail() -> PrismTrack:
 def both() -> tuple[Pass[PrismState], SteppedIncrement]:
     """The pass, and the state after increments, on the same rail."""
     law = ACCELERATING.material()
-    of, body = RolledRail(ACCELERATING).load(rail(), 0), SteppedPrism(rail(), law)
+    of, body = load_on(rail(), ACCELERATING), SteppedPrism(rail(), law)
     with one_thread():
         found = passing(rail(), law, of, rail().virgin(law))
         wheel = SteppedPatch(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any, cast
 
@@ -30,14 +30,6 @@ from solver.typing import Array
 _Family = Late("solver.derivatives.family:Family")
 
 
-@dataclass(frozen=True, slots=True)
-class BegunPasses:
-    """Passes that are found: what is kept of each, and the state that the last one left."""
-
-    traces: list[Any]
-    left: Any
-
-
 class Passes(ABC):
     """The passes of a loading path in a window of one size, as results see them.
 
@@ -49,18 +41,16 @@ class Passes(ABC):
     law : law of the material
     extent : size of the window in words, for the error if the largest window is too small
     beside : (pass) -> fields of a further body, None without
-    begun : passes found in another process, which this one goes on from; None without
     """
 
     parameters: Any
     law: Law
     extent = ""
     beside: Callable[[Pass[Any]], MeshFields] | None = None
-    begun: BegunPasses | None = None
 
     @abstractmethod
     def found(self, budget: SolveBudget) -> Iterator[Pass[Any]]:
-        """Yield the passes behind those begun; ``budget`` counts the solves of each."""
+        """Yield the passes behind those of `begin`; ``budget`` counts the solves of each."""
 
     def follow(self, beside: Pass[Any], last: Pass[Any] | None, number: int) -> Pass[Any]:
         """Return a pass, counted from 0, of a run whose parameters are almost those of another one.
@@ -94,8 +84,11 @@ class Passes(ABC):
         """Return what `begin` needs after a pass; empty where other passes cannot go on from it."""
         return {}
 
-    def begin(self, state: Mapping[str, Array]) -> None:
-        """Go on from a `state` of passes over the same body."""
+    def begin(self, state: Mapping[str, Array]) -> tuple[list[Any], Any]:
+        """Go on from a `state` of passes over the same body; return their traces and what is left.
+
+        They may have been found in another process.
+        """
         raise NotImplementedError
 
     def decided(self, traces: Sequence[Any]) -> bool:
@@ -181,10 +174,8 @@ class _Path:
         self._found: Pass[Any] | None = None
         self._left: Any = None
         if self._state and reach == self._state["reach"].item():
-            self._passes.begin(self._state)
+            self._traces, self._left = self._passes.begin(self._state)
             self._steps = self._state["steps"].astype(int).tolist()
-        if begun := self._passes.begun:
-            self._traces, self._left = begun.traces.copy(), begun.left
         each = []
         if self._family:
             self._family.keep_mesh(self._last, self._passes.same_mesh)

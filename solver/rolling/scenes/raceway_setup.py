@@ -30,7 +30,7 @@ from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.raceway import BESIDE, RacewayParameters
 from solver.rolling.scenes.rail_outputs import remedies, sketched
-from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes, effort_of
+from solver.rolling.scenes.rail_passes import by_rail_passes, effort_of
 from solver.rolling.scenes.rail_window import PrismGeometry, split_rows, whole
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.scenes.scene import Advice, Effort, Method
@@ -129,34 +129,35 @@ def track_of(own: RacewayGeometry) -> PrismTrack:
     return own.track(section_of(own), _LEVELS)
 
 
-class RolledRaceway(RolledPrism):
-    """A ball or roller on a raceway."""
+def prism(parameters: RacewayParameters, reach: float) -> PrismTrack:
+    """Return the raceway; errors as of `geometry`."""
+    return track_of(geometry(parameters, reach))
 
-    def track(self, reach: float) -> PrismTrack:
-        """See `RolledPrism`."""
-        return track_of(geometry(self.parameters, reach))
 
-    def made(self, track: PrismTrack, own: RacewayParameters, last: Any) -> PatchLoad:
-        """See `RolledPrism`; a prescribed shear may be above the shear strength."""
-        p, ellipse = own, own.ellipse
-        if p.load == "hertz":
-            shear = p.traction * p.friction
-            if error := uncarried(p.material(), abs(shear) * ellipse.peak_pressure):
-                raise error
-            return EllipticPatch(
-                grid=track.grid, load=RollingLoad(force=ellipse.force), a=ellipse.a, b=ellipse.b,
-                shear=(shear, 0.0),
-            )  # fmt: skip
-        wheel = ProfiledWheel(
-            profile=crowned(p.across, p.across).height,
-            radius=p.radius,
-            elasticity=p.wheel_elasticity,
-            track_radius=p.ring,
-        )
-        return RollingPatch(
-            grid=track.grid, compliance=track.compliance, wheel=wheel,
-            load=p.under(ellipse.force), **p.rubbing,
+def load_on(track: PrismTrack, own: RacewayParameters, last: Any = None) -> PatchLoad:
+    """Return the load of a pass; ``last`` has no effect.
+
+    Raises `LimitLoad` or `Runaway` if the surface does not carry a prescribed shear.
+    """
+    p, ellipse = own, own.ellipse
+    if p.load == "hertz":
+        shear = p.traction * p.friction
+        if error := uncarried(p.material(), abs(shear) * ellipse.peak_pressure):
+            raise error
+        return EllipticPatch(
+            grid=track.grid, load=RollingLoad(force=ellipse.force), a=ellipse.a, b=ellipse.b,
+            shear=(shear, 0.0),
         )  # fmt: skip
+    wheel = ProfiledWheel(
+        profile=crowned(p.across, p.across).height,
+        radius=p.radius,
+        elasticity=p.wheel_elasticity,
+        track_radius=p.ring,
+    )
+    return RollingPatch(
+        grid=track.grid, compliance=track.compliance, wheel=wheel, load=p.under(ellipse.force),
+        **p.rubbing,
+    )  # fmt: skip
 
 
 HERTZ_PRESSURE = declare("hertz_pressure", "peak pressure p0 of the elastic Hertz contact", "MPa")
@@ -174,7 +175,7 @@ _PIXELS = 24
 
 def method(parameters: RacewayParameters) -> Method:
     """Return the method of the passes."""
-    return partial(by_rail_passes, rolled=RolledRaceway)
+    return partial(by_rail_passes, prism=prism, load_on=load_on)
 
 
 def view(parameters: RacewayParameters) -> View:

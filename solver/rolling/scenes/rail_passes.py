@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
@@ -26,7 +25,7 @@ from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.results.rail import PrismBody, of_patch, zone_fields
-from solver.rolling.scenes.pass_runner import BegunPasses, Passes, by_passes
+from solver.rolling.scenes.pass_runner import Passes, by_passes
 from solver.rolling.scenes.passes import PassTrace
 from solver.rolling.scenes.rail_outputs import finer
 from solver.rolling.search import search
@@ -51,6 +50,10 @@ class RailTrace(PassTrace):
 
 
 _TRACED = tuple(each.name for each in fields(RailTrace))
+Prism = Callable[[Any, float], PrismTrack]
+"""(parameters, ratio of zone and window to their usual size) -> the prism of a scene."""
+LoadOn = Callable[[PrismTrack, Any, Any], PatchLoad]
+"""(prism, parameters of a pass, load of an earlier pass or None) -> the load of the pass."""
 
 
 def by_rail_passes(
@@ -58,14 +61,15 @@ def by_rail_passes(
     runs: Sequence[Any],
     monitor: Monitor,
     *,
-    rolled: Callable[[Any], RolledPrism],
+    prism: Prism,
+    load_on: LoadOn,
     begun: Mapping[str, Array] | None = None,
 ) -> Iterator[FinishedRun]:
     """Compute pass after pass, see `by_passes`; with smaller elements if that is the remedy.
 
     Such runs have a note, and no state: a longer run begins with the usual elements too.
     """
-    computed = partial(by_passes, window=partial(RailPasses, rolled), reaches=REACHES)
+    computed = partial(by_passes, window=partial(RailPasses, prism, load_on), reaches=REACHES)
 
     def otherwise(remaining: Sequence[Any], error: NotConverged) -> Iterator[FinishedRun] | None:
         last = remaining[-1]
@@ -100,62 +104,37 @@ def _noted(run: FinishedRun, note: str) -> FinishedRun:
     return replace(run, notes=(*run.notes, note), state=dict)
 
 
-class RolledPrism(ABC):
-    """The prism of a scene, and its loads.
-
-    Attributes
-    ----------
-    parameters : parameters of the scene
-    """
-
-    def __init__(self, parameters: Any) -> None:
-        self.parameters, self._passes = parameters, parameters.each_pass()
-        self._made: tuple[PrismTrack, Any, PatchLoad] | None = None
-
-    @abstractmethod
-    def track(self, reach: float) -> PrismTrack:
-        """Return the prism; ``reach`` is the ratio of zone and window to their usual size.
-
-        Raises `ModelError` if the section has no room for them.
-        """
-
-    @abstractmethod
-    def made(self, track: PrismTrack, own: Any, last: Any) -> PatchLoad:
-        """Return the load of a pass with these parameters; ``last`` is one on this prism, or None.
-
-        Raises `LimitLoad` if no prism of the material can carry it.
-        """
-
-    def load(self, track: PrismTrack, number: int) -> PatchLoad:
-        """Return the load of a pass, counted from 0: the same object as before if it is equal."""
-        own, known = self._passes[number], self._made
-        if known is None or known[:2] != (track, own):
-            last = known[2] if known is not None and known[0] is track else None
-            known = self._made = track, own, self.made(track, own, last)
-        return known[2]
-
-
 class RailPasses(Passes):
     """Passes over a prism.
 
     Parameters
     ----------
-    rolled : (parameters of a scene) -> its prism and loads
+    prism, load_on : of the scene
     """
 
     def __init__(
-        self, rolled: Callable[[Any], RolledPrism], parameters: Any, view: View, reach: float
+        self, prism: Prism, load_on: LoadOn, parameters: Any, view: View, reach: float
     ) -> None:
         self.parameters, self.law = parameters, parameters.material()
-        self._rolled = rolled(parameters)
-        self._track = self._rolled.track(reach)
+        self._each, self._load_on = parameters.each_pass(), load_on
+        self._made: tuple[Any, PatchLoad] | None = None
+        self._track = prism(parameters, reach)
         body = PrismBody(self._track, self.law, view.profile_body)
         self._samples = Samples(body, view)
         z, y = self._track.points
         self.extent = f"{np.ptp(z):.3g} mm wide and {np.ptp(y):.3g} mm deep"
         self.beside = partial(zone_fields, body, view.loaded, view.unloaded)
+        self._first = 0
+        self._before: PrismState | None = None
         self._guess: Array | None = None
         self._start: PatchStart | None = None
+
+    def load(self, number: int) -> PatchLoad:
+        """Return the load of a pass, counted from 0: the same object as before if it is equal."""
+        own, known = self._each[number], self._made
+        if known is None or known[0] != own:
+            known = self._made = own, self._load_on(self._track, own, known and known[1])
+        return known[1]
 
     def found(self, budget: SolveBudget) -> Iterator[Pass[PrismState]]:
         """See `Passes`.
@@ -164,12 +143,11 @@ class RailPasses(Passes):
         are nearly the same, it begins with the strain of the last pass; while passes still yield,
         that guess is worse, and after another load it does not converge.
         """
-        track, law, begun = self._track, self.law, self.begun
-        before, guess = begun.left if begun else track.virgin(law), self._guess
-        start, first = self._start, len(begun.traces) if begun else 0
-        last = self._rolled.load(track, first - 1) if begun else None
+        track, law, first = self._track, self.law, self._first
+        before, guess, start = self._before or track.virgin(law), self._guess, self._start
+        last = self.load(first - 1) if first else None
         for number in range(first, self.parameters.passes):
-            load = self._rolled.load(track, number)
+            load = self.load(number)
             with one_thread():
                 found = search(
                     track, law, load, before, guess if load is last else None,
@@ -214,7 +192,7 @@ class RailPasses(Passes):
         }
         return {**kept, "guess": found.strain} if found.steps <= _SETTLED else kept
 
-    def begin(self, state: Mapping[str, Array]) -> None:
+    def begin(self, state: Mapping[str, Array]) -> tuple[list[RailTrace], PrismState]:
         """See `Passes`."""
         virgin = self._track.virgin(self.law)
         left = PrismState(
@@ -222,8 +200,9 @@ class RailPasses(Passes):
         )
         each = zip(*(state[name] for name in _TRACED), strict=True)
         traces = [RailTrace(**dict(zip(_TRACED, values, strict=True))) for values in each]
-        self.begun, self._guess = BegunPasses(traces, left), state.get("guess")
+        self._first, self._before, self._guess = len(traces), left, state.get("guess")
         self._start = PatchStart(state["traction"], *state["motion"].tolist())
+        return traces, left
 
 
 @kept

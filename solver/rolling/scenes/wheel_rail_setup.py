@@ -15,7 +15,7 @@ from solver.rolling.rail.patch import RollingPatch
 from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.scenes.rail_outputs import cycles, remedies, sketched
-from solver.rolling.scenes.rail_passes import RolledPrism, by_rail_passes, effort_of
+from solver.rolling.scenes.rail_passes import by_rail_passes, effort_of
 from solver.rolling.scenes.rolling_setup import AXLE_HEIGHT
 from solver.rolling.scenes.wheel_rail import WheelRailParameters
 from solver.rolling.scenes.wheel_rail_contact import expected_contact, rail_of, upper, wheel_of
@@ -49,26 +49,24 @@ _PIXEL = 0.5
 """Distance of positions of maps across and along [mm]; in depth it is half of that."""
 
 
-class RolledRail(RolledPrism):
-    """A wheel on a rail."""
+def prism(parameters: WheelRailParameters, reach: float) -> PrismTrack:
+    """Return the rail; errors as of `geometry` and `meshed`."""
+    p, own = parameters, geometry(parameters, reach)
+    meshed(p, own)
+    return stressed_track(own, p.rail_stress, p.thermal_strain)
 
-    def track(self, reach: float) -> PrismTrack:
-        """See `RolledPrism`."""
-        p, own = self.parameters, geometry(self.parameters, reach)
-        meshed(p, own)
-        return stressed_track(own, p.rail_stress, p.thermal_strain)
 
-    def made(self, track: PrismTrack, own: WheelRailParameters, last: Any) -> RollingPatch:
-        """See `RolledPrism`; wheels of other passes share the influences of tractions."""
-        rolls = {"wheel": wheel_of(own), "load": own.under(own.load), **own.rubbing}
-        if last is not None:
-            return cast("RollingPatch", last.changed(**rolls))
-        return RollingPatch(grid=track.grid, compliance=track.compliance, **rolls)
+def load_on(track: PrismTrack, own: WheelRailParameters, last: Any = None) -> RollingPatch:
+    """Return the load of a pass; it shares the influences of tractions with that of another one."""
+    rolls = {"wheel": wheel_of(own), "load": own.under(own.load), **own.rubbing}
+    if last is not None:
+        return cast("RollingPatch", last.changed(**rolls))
+    return RollingPatch(grid=track.grid, compliance=track.compliance, **rolls)
 
 
 def method(parameters: WheelRailParameters) -> Method:
     """Return the method of the passes."""
-    return partial(by_rail_passes, rolled=RolledRail)
+    return partial(by_rail_passes, prism=prism, load_on=load_on)
 
 
 def view(parameters: WheelRailParameters) -> View:
