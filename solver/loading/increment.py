@@ -35,10 +35,9 @@ from solver.fem.operators import Operator
 from solver.fem.window import Windowed
 from solver.linear.solvers import Singular, one_thread
 from solver.loading.energy import plastic_work
-from solver.loading.flow import is_singular, mechanism
+from solver.loading.limit import is_singular, mechanism, slide
 from solver.loading.outcome import IncrementFailed, Mechanism, Yielded
 from solver.loading.program import Tolerances
-from solver.loading.slide import Slide, slide
 from solver.loading.step import (
     NewtonStep,
     Series,
@@ -319,7 +318,7 @@ class Increment:
                 u[k] = self.start.u[k]
         return replace(self.guess, u=tuple(u))
 
-    def _slide(self, *places: tuple[Vectors, Candidates]) -> Slide | None:
+    def _slide(self, *places: tuple[Vectors, Candidates]) -> Mechanism | None:
         """Return the slide of a body in one of the iterates ``places``, or in the first one.
 
         The first iterate is examined because a later one may have lost the contacts of the body. A

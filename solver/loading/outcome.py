@@ -10,7 +10,6 @@ import numpy as np
 
 from solver.contact.state import Converged, State
 from solver.errors import NotConverged, SolverError
-from solver.loading.slide import Slide
 from solver.tensors import AXES
 from solver.typing import Array, Ints
 
@@ -27,12 +26,14 @@ class Yielded(SolverError):
 class Mechanism:
     """A motion in which bodies flow, strained most in ``body`` at ``place`` [mm].
 
-    ``ratio`` is the power of the load over the largest power that can resist it.
+    ``ratio`` is the power of the load over the largest power that can resist it. If it ``slides``,
+    the motion is a rigid one of ``body`` along its contacts, which only friction resists.
     """
 
     ratio: float = 0.0
     body: str = ""
     place: tuple[float, ...] = (0.0, 0.0)
+    slides: bool = False
 
     def __lt__(self, other: Mechanism) -> bool:
         """Whether the other mechanism is closer to a proof."""
@@ -45,10 +46,15 @@ class Mechanism:
 
     @property
     def excludes(self) -> bool:
-        """Whether equilibrium is excluded from any other state: as `limit`, for any history."""
-        return self.limit
+        """Whether equilibrium is excluded from any other state: normal forces may differ there."""
+        return self.limit and not self.slides
 
     def __str__(self) -> str:
+        if self.slides:
+            return (
+                f"body {self.body!r} slides on all its contacts: its load is {self.ratio:.4g} "
+                "times the largest friction"
+            )
         at = ", ".join(f"{axis} = {x:.4g}" for axis, x in zip(AXES, self.place, strict=False))
         return (
             f"body {self.body!r} flows around {at} mm, where the load does "
@@ -57,9 +63,9 @@ class Mechanism:
 
 
 class IncrementFailed(SolverError):
-    """The increment did not converge; ``why`` is the mechanism closest to a proof, or a slide."""
+    """The increment did not converge; ``why`` is the mechanism closest to a proof."""
 
-    def __init__(self, message: str, why: Mechanism | Slide | None = None) -> None:
+    def __init__(self, message: str, why: Mechanism | None = None) -> None:
         super().__init__(message)
         self.why = why or Mechanism()
 

@@ -21,13 +21,13 @@ from solver.linear.solvers import one_thread
 from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.integration import doubtful, integrated, lost
+from solver.loading.limit import spent
 from solver.loading.narrowing import FailedInWindows, narrowed
 from solver.loading.outcome import IncrementFailed, Mechanism, PathEnded, Point, Tally, Yielded
 from solver.loading.prediction import MEMORY, Predictor
 from solver.loading.program import INCREMENT_ERROR, ROUNDING, Control
-from solver.loading.slide import Slide, spent
 
-Attempt = tuple[float, Mechanism | Slide | None]
+Attempt = tuple[float, Mechanism | None]
 """Time of an increment that failed, and the reason; None if it failed only in windows."""
 Report = Callable[[], None]
 Watch = Callable[[Converged], Any]
@@ -290,7 +290,7 @@ class Stepper:
 
     def _longer(
         self, point: Point, failed: Sequence[Attempt]
-    ) -> Converged | tuple[float, Mechanism | Slide]:
+    ) -> Converged | tuple[float, Mechanism]:
         """Return a longer increment that converges, or the time and reason of the failure.
 
         The shortest increment has failed. Close to a limit load its failure may prove nothing, but
@@ -308,11 +308,11 @@ class Stepper:
             found = known or self._with_whole_bodies(point, attempted)
             if isinstance(found, Converged):
                 return found
-            if found.excludes and found.limit:
+            if found.excludes:
                 return attempted, found
         return time, why
 
-    def _with_whole_bodies(self, point: Point, time: float) -> Converged | Mechanism | Slide:
+    def _with_whole_bodies(self, point: Point, time: float) -> Converged | Mechanism:
         """Return the increment to a time with whole bodies, or the reason why it fails."""
         try:
             return self._increment(point, time, contact=True, patient=False, whole=True)
@@ -436,7 +436,7 @@ class Stepper:
         return (*history, self._watch(now)) if self._watch else history
 
     def _ended(
-        self, failure: IncrementFailed, point: Point, attempted: float, why: Mechanism | Slide
+        self, failure: IncrementFailed, point: Point, attempted: float, why: Mechanism
     ) -> NotConverged:
         reached = point.now.state.time
         way = f"between {self.place(reached)} and {self.place(attempted)}"

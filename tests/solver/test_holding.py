@@ -26,7 +26,7 @@ from solver import (
     solve,
 )
 from solver.loading import stepper
-from solver.loading.slide import spent
+from solver.loading.limit import spent
 from solver.mesh import grid, mapped
 from solver.model.friction import Coulomb, lines_of
 from solver.model.rigid import arc

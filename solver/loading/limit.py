@@ -1,12 +1,14 @@
-"""Proof of a limit load: a mechanism on which the load does more work than can be dissipated."""
+"""Proof of a limit load: a motion on which the load does more work than can be dissipated."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import linalg
 
 from solver.contact.candidates import Candidates
+from solver.contact.state import State
 from solver.contact.system import System
 from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation
@@ -28,6 +30,11 @@ _MECHANISM = 1e-2
 """The same ratio for bodies without load."""
 _MOVES = 1e-3
 """Elastic energy of a part in a step over that of all parts: the part moves above this ratio."""
+_SPENT = 0.95
+"""Tangential force of a pair over its friction bound: a message gives a hint above this ratio."""
+_ALONG = 0.05
+"""Normal motion over all motion of the contact points in a slide, at most: deformed surfaces are
+not quite straight."""
 
 
 def mechanism(
@@ -100,6 +107,39 @@ def mechanism(
     )
 
 
+def slide(system: System, residuals: Sequence[Array], candidates: Candidates) -> Mechanism | None:
+    """Return the slide of a floating body under the normal forces of the candidates, if any.
+
+    Motions go along all closed contacts, so that they do not change normal forces. Deformed
+    surfaces are not quite straight, so the power of normal forces counts too.
+
+    Parameters
+    ----------
+    residuals : external minus internal forces of each part, without contact forces [N]
+    """
+    n = candidates.n
+    N = candidates.forces[:n]
+    closed = N > 0
+    if not closed.any():
+        return None
+    bound = candidates.lines.least(N)
+    for i, part in enumerate(system.parts):
+        motion = candidates.of_part(i, part.rigid)
+        if not candidates.frictional or not motion.size or motion[candidates.linked].any():
+            continue
+        _, apart, ways = linalg.svd(motion[:n][closed])
+        apart = np.append(apart, np.zeros(len(ways) - len(apart)))
+        along = ways[apart <= _ALONG * np.linalg.norm(motion, 2)].T
+        load = along.T @ (part.rigid.T @ (residuals[i] + candidates.pushes[i]))
+        for way in (*np.eye(len(load)), load):
+            power = abs(float(load @ way))
+            moved = motion @ along @ way
+            most = float(bound @ np.abs(moved[candidates.along])) + abs(float(N @ moved[:n]))
+            if power > most > 0:
+                return Mechanism(ratio=power / most, body=part.body.name, slides=True)
+    return None
+
+
 def is_singular(
     parts: Sequence[Part], time: float, step: Vectors, responses: Sequence[PartResponse]
 ) -> bool:
@@ -114,3 +154,17 @@ def is_singular(
     moves = elastic > _MOVES * elastic.sum()
     least = _SINGULAR if loaded else _MECHANISM
     return bool((tangent < least * elastic)[moves].any())
+
+
+def spent(system: System, state: State) -> str:
+    """Return a hint on pairs that are close to their friction bound in a state; else empty."""
+    found = []
+    for k, (interface, contact) in enumerate(zip(system.interfaces, state.contacts, strict=True)):
+        pairing = system.pairing(state, k)
+        lines = system.bound(k, pairing, state, state.time).over(pairing.area)
+        most = float(lines.least(contact.normal)[contact.normal > 0].sum())
+        share = abs(float(contact.tangential.sum())) / most if most > 0 else 0.0
+        if share > _SPENT:
+            names = [system.all_names[k] for k in (interface.slave, interface.master)]
+            found.append(f"{' and '.join(names)} was at {share:.0%} of its bound")
+    return f"; just before, friction between {', '.join(found)}" if found else ""
