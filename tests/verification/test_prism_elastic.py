@@ -20,6 +20,7 @@ from solver.rolling.rail.modes import Modes
 from solver.rolling.rail.section import Section
 from solver.tensors import SQRT2
 from tests.verification.closed_forms import HertzEllipse
+from tests.verification.prism_fields import response, rows_of
 
 Array = NDArray[np.float64]
 
@@ -199,14 +200,14 @@ def random_fields(modes: Modes) -> tuple[Array, Array]:
 
 def test_the_condensed_prism_is_the_whole_one(monkeypatch: pytest.MonkeyPatch) -> None:
     section, zone = block(1.0, reach=8.0)
-    rows = section.rows(on_top(section, 3.0))
+    rows = rows_of(section, on_top(section, 3.0))
     condensed = Modes(section, zone, 16.0, 8, surface=rows)
     eigenstress, forces = random_fields(condensed)
-    found = condensed.solve(eigenstress, forces)
+    found = response(condensed, eigenstress, forces)
     whole = Modes(section, np.ones_like(zone), 16.0, 8, surface=rows)
     everywhere = np.zeros((len(whole.points), 8, 6))
     everywhere[condensed.points] = eigenstress
-    exact = whole.solve(everywhere, forces)
+    exact = response(whole, everywhere, forces)
     size = np.abs(exact.strain).max()
     assert found.strain == pytest.approx(exact.strain[condensed.points], abs=ROUNDING * size)
     size = np.abs(exact.displacement).max()
@@ -214,21 +215,21 @@ def test_the_condensed_prism_is_the_whole_one(monkeypatch: pytest.MonkeyPatch) -
     by_columns = condensed.displacement(condensed.nodal(eigenstress) + condensed.pushed(forces))
     assert by_columns == pytest.approx(exact.displacement, abs=ROUNDING * size)
     monkeypatch.setenv("RESIDUA_LINEAR_SOLVER", "superlu")
-    other = Modes(section, zone, 16.0, 8, surface=rows).solve(eigenstress, forces)
+    other = response(Modes(section, zone, 16.0, 8, surface=rows), eigenstress, forces)
     assert other.displacement == pytest.approx(exact.displacement, abs=ROUNDING * size)
 
 
 def test_a_window_is_a_part_of_all_stations() -> None:
     """Also with eigenstress that goes on behind it."""
     section, zone = block(1.5, reach=8.0)
-    rows = section.rows(on_top(section, 3.0))
+    rows = rows_of(section, on_top(section, 3.0))
     whole = Modes(section, zone, 16.0, 10, surface=rows)
     fade = np.array([0.8, 0.3, 0.1])
     part = Modes(section, zone, 16.0, 10, window=7, behind=fade, surface=rows)
     eigenstress, forces = random_fields(part)
-    found = part.solve(eigenstress, forces)
+    found = response(part, eigenstress, forces)
     everywhere = np.concatenate([eigenstress, eigenstress[:, -1:] * fade[:, None]], axis=1)
-    exact = whole.solve(everywhere, np.pad(forces, ((0, 0), (0, 3))))
+    exact = response(whole, everywhere, np.pad(forces, ((0, 0), (0, 3))))
     size = np.abs(exact.strain).max()
     assert found.strain == pytest.approx(exact.strain[:, :7], abs=ROUNDING * size)
     assert part.x == pytest.approx(whole.x[:7])
@@ -237,10 +238,10 @@ def test_a_window_is_a_part_of_all_stations() -> None:
 
 def test_a_shift_of_the_load_shifts_the_response() -> None:
     section, zone = block(1.5, reach=8.0)
-    modes = Modes(section, zone, 16.0, 10, surface=section.rows(on_top(section, 3.0)))
+    modes = Modes(section, zone, 16.0, 10, surface=rows_of(section, on_top(section, 3.0)))
     eigenstress, forces = random_fields(modes)
-    one = modes.solve(eigenstress, forces)
-    other = modes.solve(np.roll(eigenstress, 3, axis=1), np.roll(forces, 3, axis=1))
+    one = response(modes, eigenstress, forces)
+    other = response(modes, np.roll(eigenstress, 3, axis=1), np.roll(forces, 3, axis=1))
     size = np.abs(one.strain).max()
     assert other.strain == pytest.approx(np.roll(one.strain, 3, axis=1), abs=ROUNDING * size)
 
@@ -248,18 +249,20 @@ def test_a_shift_of_the_load_shifts_the_response() -> None:
 def test_forces_and_eigenstress_are_reciprocal() -> None:
     """Betti: the work of the eigenstress in the strain of the forces is that of the forces."""
     section, zone = block(1.5, reach=8.0)
-    modes = Modes(section, zone, 16.0, 10, surface=section.rows(on_top(section, 3.0)))
+    modes = Modes(section, zone, 16.0, 10, surface=rows_of(section, on_top(section, 3.0)))
     eigenstress, forces = random_fields(modes)
-    of_forces = (modes.solve(forces=forces).strain * eigenstress).sum(axis=(1, 2)) @ modes.weights
-    of_stress = (modes.solve(eigenstress).displacement * forces).sum()
+    of_forces = (response(modes, forces=forces).strain * eigenstress).sum(
+        axis=(1, 2)
+    ) @ modes.weights
+    of_stress = (response(modes, eigenstress).displacement * forces).sum()
     assert of_forces == pytest.approx(of_stress, rel=ROUNDING)
 
 
 def test_the_kernel_is_the_response_to_one_station() -> None:
     section, zone = block(1.5, reach=8.0)
-    modes = Modes(section, zone, 16.0, 10, surface=section.rows(on_top(section, 3.0)))
+    modes = Modes(section, zone, 16.0, 10, surface=rows_of(section, on_top(section, 3.0)))
     _, forces = random_fields(modes)
-    exact = modes.solve(forces=forces).displacement
+    exact = response(modes, forces=forces).displacement
     apart = (np.arange(10)[:, None] - np.arange(10)) % 10
     found = np.einsum("ijcd,jd->ic", modes.kernel[:, :, apart], forces)
     assert found == pytest.approx(exact, abs=ROUNDING * np.abs(exact).max())
@@ -283,9 +286,9 @@ def test_loads_constant_along_the_prism_are_plane_strain() -> None:
     exact = part.strain(u)  # zz is along the prism there
     nodal = part.loads.at(1.0).reshape(-1, 2)
     nodes = np.flatnonzero(nodal.any(axis=1))
-    modes = Modes(section, zone, 20.0, 4, surface=section.rows(nodes))
+    modes = Modes(section, zone, 20.0, 4, surface=rows_of(section, nodes))
     forces = np.concatenate([0 * nodes, nodal[nodes, 1], nodal[nodes, 0]])
-    strain = modes.solve(forces=np.tile(forces[:, None], 4)).strain
+    strain = response(modes, forces=np.tile(forces[:, None], 4)).strain
     expected = np.zeros((len(modes.points), 4, 6))
     expected[..., [2, 1, 4]] = exact[[0, 1, 3]][:, modes.points, None].transpose(1, 2, 0)
     assert strain == pytest.approx(expected, abs=ROUNDING * np.abs(exact).max())
@@ -320,8 +323,8 @@ def pressed(length: float, h: float) -> tuple[Modes, Array, Array]:
     x = h * (ahead - np.arange(2 * ahead + 1))
     nodes, forces = sampled_hertz(section, 10.0, x, ELLIPSE)
     modes = Modes(section, zone, length, round(length / h), window=len(x),
-                  surface=section.rows(nodes))  # fmt: skip
-    near = modes.solve(forces=forces).strain
+                  surface=rows_of(section, nodes))  # fmt: skip
+    near = response(modes, forces=forces).strain
     far = FarField(modes, modes.x[ahead], levels=2)
     C = STEEL.stiffness(6)
     return modes, (near + far.strain @ far.resultants(forces)) @ C, near @ C
@@ -366,9 +369,9 @@ def test_the_surface_under_a_circular_pressure_is_hertzs_paraboloid() -> None:
     section, zone = block(2.0, half=10.0, deep=10.0, reach=300.0, ratio=2.0)
     x = 2.0 * (4 - np.arange(9))
     nodes, forces = sampled_hertz(section, 10.0, x, circle)
-    modes = Modes(section, zone, 64.0, 32, window=9, surface=section.rows(nodes))
+    modes = Modes(section, zone, 64.0, 32, window=9, surface=rows_of(section, nodes))
     far = FarField(modes, modes.x[4], levels=2)
-    u = modes.solve(forces=forces).displacement + far.displacement @ far.resultants(forces)
+    u = response(modes, forces=forces).displacement + far.displacement @ far.resultants(forces)
     up = u[len(nodes) : 2 * len(nodes)]
     z = section.plane.X[0, nodes]
     middle = int(np.abs(z).argmin())
@@ -407,11 +410,11 @@ def test_a_bar_on_springs_is_the_endless_beam(length: float) -> None:
     top = on_top(section, 15.0)
     n = round(length / 16.0)
     modes = Modes(section, np.ones(len(section.weights), bool), length, n,
-                  surface=section.rows(top))  # fmt: skip
+                  surface=rows_of(section, top))  # fmt: skip
     middle = len(top) + int(np.abs(section.plane.X[0, top]).argmin())
     forces = np.zeros((3 * len(top), n))
     forces[middle, n // 2] = -force / 16.0
-    near = modes.solve(forces=forces)
+    near = response(modes, forces=forces)
     far = FarField(modes, modes.x[n // 2])
     resultants = far.resultants(forces)
     assert resultants == pytest.approx([0.0, -force, 0.0, 0.0], abs=1e-9)
@@ -456,11 +459,11 @@ def turned(spring: float, poisson_ratio: float) -> tuple[Array, Array]:
     section = Section(mesh, rubber, springs={"bottom": (spring, spring, spring)})
     top = on_top(section, 30.0)
     modes = Modes(section, section.points[1].mean(axis=1) > -40.0, 64.0, 8,
-                  surface=section.rows(top))  # fmt: skip
+                  surface=rows_of(section, top))  # fmt: skip
     at = len(top) + int(np.abs(section.plane.X[0, top] - 25.0).argmin())
     forces = np.zeros((3 * len(top), 8))
     forces[at, 0] = -1.0
-    found = modes.solve(forces=forces)
+    found = response(modes, forces=forces)
     return found.strain @ rubber.stiffness(6), -found.displacement[at].mean()
 
 
@@ -499,7 +502,7 @@ def test_a_clamped_bar_is_the_clamped_beam(span: float) -> None:
     section, foundation = rail()
     top, force = on_top(section, 15.0), 1000.0
     modes = Modes(section, np.ones(len(section.weights), bool), 256.0, 16,
-                  surface=section.rows(top))  # fmt: skip
+                  surface=rows_of(section, top))  # fmt: skip
     endless, clamped = (FarField(modes, modes.x[8], span=each) for each in (None, span))
     down = np.array([0.0, -force, 0.0, 0.0])
     lowest = int(section.points.reshape(2, -1)[1].argmin())
@@ -517,7 +520,7 @@ def test_a_clamped_bar_is_the_clamped_beam(span: float) -> None:
 def long_bar() -> tuple[Modes, FarField, FarField]:
     """The bar, its far field where it is endless, and where it is clamped at both ends."""
     section, _ = rail()
-    rows = section.rows(on_top(section, 15.0))
+    rows = rows_of(section, on_top(section, 15.0))
     modes = Modes(section, np.ones(len(section.weights), bool), 2048.0, 128, surface=rows)
     endless, clamped = (FarField(modes, modes.x[64], levels=3, span=span) for span in (None, 960.0))
     return modes, endless, clamped
@@ -527,12 +530,12 @@ def long_bar() -> tuple[Modes, FarField, FarField]:
 def test_a_clamped_bar_does_not_move_at_its_ends(resultant: int) -> None:
     """0.25 % at most of the endless one's motion there: the section is held in the mean."""
     section, _ = rail()
-    rows = section.rows(on_top(section, 15.0))
+    rows = rows_of(section, on_top(section, 15.0))
     modes, endless, clamped = long_bar()
     middle, at_ends = 64, [34, 94]
     forces = np.zeros((rows.shape[0], 128))
     forces[:, middle] = np.linalg.pinv((rows @ section.rigid).T)[:, resultant] / 16.0
-    near = modes.solve(forces=forces).displacement[:, at_ends]
+    near = response(modes, forces=forces).displacement[:, at_ends]
     held, moved = (
         np.abs(near + far.displacement[:, at_ends] @ far.resultants(forces)).max()
         for far in (clamped, endless)
@@ -545,7 +548,7 @@ def resting(length: float) -> tuple[Modes, FarField, sparse.csr_array]:
     """The bar held along as across, stations of 16 mm; its far field, and the rows of its top."""
     mesh = grid(np.linspace(-15.0, 15.0, 3), np.linspace(-60.0, 0.0, 7))
     section = Section(mesh, STEEL, springs={"bottom": (0.03, 0.03, 0.03)})
-    rows = section.rows(on_top(section, 15.0))
+    rows = rows_of(section, on_top(section, 15.0))
     modes = Modes(section, np.ones(len(section.weights), bool), length, round(length / 16.0),
                   window=11, surface=rows)  # fmt: skip
     return modes, FarField(modes, modes.x[5]), rows
@@ -565,7 +568,7 @@ def test_each_resultant_has_its_far_field(resultant: int) -> None:
         deep = section.points[1].ravel() < -40.0  # above, stations do not resolve the load
         forces = np.zeros((len(shape), 11))
         forces[:, 5] = shape / 16.0 / (shape @ shape)
-        near, resultants = modes.solve(forces=forces), far.resultants(forces)
+        near, resultants = response(modes, forces=forces), far.resultants(forces)
         assert resultants[resultant] == pytest.approx(1.0)
         alone.append(near.displacement)
         found.append((near.displacement + far.displacement @ resultants,
@@ -590,14 +593,14 @@ def test_bad_input_is_told_with_what_is_allowed() -> None:
         ({"window": 9}, "window = 9: must be in 1 to 8"),
         ({"window": 5, "behind": [1.0]}, "behind = 1: must have 3 factors"),
         ({"zone": np.zeros_like(zone)}, "must choose some of"),
-        ({"surface": section.rows(np.array([0]))}, "surface = 0: this row has nodes outside"),
+        ({"surface": rows_of(section, np.array([0]))}, "surface = 0: this row has nodes outside"),
         ({"surface": sparse.csr_array(np.ones((1, section.n)))}, "surface = 0: this row is along"),
     ):
         given = {"zone": zone, "length": 10.0, "stations": 8, **change}
         with pytest.raises(ModelError, match=told):
             Modes(section, **given)
-    held = Modes(section, zone, 10.0, 8, surface=section.rows(on_top(section, 0.1)))
-    carrying = Modes(section, zone, 10.0, 8, surface=section.rows(on_top(section, 1.5)))
+    held = Modes(section, zone, 10.0, 8, surface=rows_of(section, on_top(section, 0.1)))
+    carrying = Modes(section, zone, 10.0, 8, surface=rows_of(section, on_top(section, 1.5)))
     for span, told in ((0.0, "must be positive"), (500.0, "must be at most 426.667 mm with 2")):
         with pytest.raises(ModelError, match=f"span = {span}: {told}"):
             FarField(carrying, 0.0, levels=2, span=span)

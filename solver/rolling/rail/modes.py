@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -39,19 +39,6 @@ _ORDER = (0, 1, 2, 4, *I_COMPONENTS)
 _PLAIN = len(_ORDER) - len(I_COMPONENTS)
 
 (weighted,) = late("rolling.kernels", "weighted")
-
-
-class ZoneResponse(NamedTuple):
-    """The fields of eigenstress and forces in the zone.
-
-    Attributes
-    ----------
-    strain : (n_points, window, 6) Mandel strain at the points of the zone
-    displacement : (n_rows, window) of the surface rows [mm]
-    """
-
-    strain: Array
-    displacement: Array
 
 
 class Modes:
@@ -176,19 +163,6 @@ class Modes:
 
     # -- forces and results ------------------------------------------------------------------
 
-    def solve(self, eigenstress: Array | None = None, forces: Array | None = None) -> ZoneResponse:
-        """Return strain and surface displacement for eigenstress and surface forces.
-
-        Parameters
-        ----------
-        eigenstress : (n_points, window, 6) stress that the strain would cause without constraint:
-            C eigenstrain, Mandel [MPa]
-        forces : (n_rows, window) forces on the surface rows, per length along x [N/mm]
-        """
-        u = self.solved(self._nodal(eigenstress, forces))
-        rows = self.rows @ u.reshape(-1, len(self.unknowns)).T
-        return ZoneResponse(self.strain(u), self._rows_at_stations(rows))
-
     def strain(self, u: Array) -> Array:
         """Return the strain (n_points, window, 6) of amplitudes (waves, 2, m) of the zone."""
         flat = np.ascontiguousarray(u.reshape(-1, len(self.unknowns)).T)
@@ -267,15 +241,6 @@ class Modes:
         phase = np.outer(self.wavenumbers, apart)
         amplitudes = self.compliance.swapaxes(0, 1)
         return superposed(amplitudes, phase, self._share, self.along, self.along)
-
-    def _nodal(self, eigenstress: Array | None, forces: Array | None) -> Array:
-        """Return the nodal forces (waves, 2, m), real and imaginary, of both [N/mm]."""
-        nodal = np.zeros((len(self.wavenumbers), 2, len(self.unknowns)))
-        if eigenstress is not None:
-            nodal += self.nodal(eigenstress)
-        if forces is not None:
-            nodal += self.pushed(forces)
-        return nodal
 
     def nodal(self, eigenstress: Array) -> Array:
         """Return the nodal forces (waves, 2, m) of an eigenstress (n_points, window, 6) [N/mm].

@@ -219,13 +219,6 @@ class Section:
                 each = spring * size[:, None, None] * np.outer(N, N)
                 np.add.at(K0, (elements[:, None, None], own[:, :, None], own[:, None, :]), each)
 
-    def rows(self, nodes: Ints) -> sparse.csr_array:
-        """Return the rows (3 n_nodes, n) of the displacements of nodes: along x, then y, then z."""
-        unknowns = (3 * nodes + np.arange(3)[:, None]).ravel()
-        indptr = np.arange(len(unknowns) + 1)
-        shape = len(unknowns), self.n
-        return sparse.csr_array((np.ones(len(unknowns)), unknowns, indptr), shape=shape)
-
     def stiffness(self, unknowns: Ints) -> Stiffness:
         """Return the stiffness on some unknowns, numbered in their order, for any wavenumber."""
         assembly = Assembly(self.dofs, unknowns, self.n)
