@@ -223,7 +223,7 @@ class System:
             if region is None:
                 law = now.responses[k]
                 if isinstance(part, Discretisation):
-                    here = PartResponse(law, part.kinematics.at(u), (u, state.time))
+                    here = PartResponse(law, part.undeformed.at(u), (u, state.time))
                 else:
                     here = part.respond(u, now.start.plastic[k], state.time)
                 found.append(self.operators[k].tangent(here, 0.0))
@@ -456,7 +456,7 @@ class System:
         strain = strain + whole.eigenstrain(time)
         if whole.body.large:
             across = strain[2] * (whole.body.kinematics == "plane_stress")
-            stress = whole.kinematics.at(u).cauchy(stress, across)
+            stress = whole.undeformed.at(u).cauchy(stress, across)
         return BodyState(time, u, stress, strain, plastic)
 
     def initial(self) -> State:

@@ -12,7 +12,7 @@ three dimensions sqrt(2) yz and sqrt(2) zx.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -50,6 +50,13 @@ class Deformation:
         elements, points, components, unknowns = self.B.shape
         return self.B.reshape(elements, points * components, unknowns)
 
+    def at(self, u: Array) -> Self:
+        """Return the body at other displacements (n,) [mm]; for small strain only strain changes.
+
+        Another measure of strain overrides it.
+        """
+        return replace(self, strain=self.change(u))
+
     def change(self, step: Array) -> Array:
         """Return the change of strain (n_components, n_points) of a small displacement (n,)."""
         flat = np.matmul(self._flat, step[self.dofs][:, :, None])
@@ -86,28 +93,6 @@ class Deformation:
         in plane stress that of the thickness, else zero.
         """
         return stress
-
-
-class Kinematics(Protocol):
-    """Strain as a function of displacements."""
-
-    @property
-    def undeformed(self) -> Deformation:
-        """The body before loading."""
-
-    def at(self, u: Array) -> Deformation:
-        """Return the body at displacements (n,) [mm]."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SmallStrain:
-    """Strain that is linear in displacements."""
-
-    undeformed: Deformation
-
-    def at(self, u: Array) -> Deformation:
-        """Return the body at displacements (n,) [mm]; only its strain changes."""
-        return replace(self.undeformed, strain=self.undeformed.change(u))
 
 
 class PartResponse(NamedTuple):

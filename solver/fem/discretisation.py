@@ -10,9 +10,7 @@ from scipy import linalg, sparse
 from solver.fem.assembly import Assembly, whole_matrix
 from solver.fem.deformation import (
     Deformation,
-    Kinematics,
     PartResponse,
-    SmallStrain,
     mean_dilatation,
     rigid_motions,
     strain_operator,
@@ -51,7 +49,7 @@ class Discretisation(Nodes, Part):
     Attributes
     ----------
     dofs : (n_elements, dim n_element_nodes) unknowns of the elements
-    kinematics : how strain follows from displacements
+    undeformed : the body before loading; strain and nodal forces follow from it
     loads : nodal forces (n,) of pressures and tractions [N]
     moving : loads that move along its boundaries, which are not in ``loads``
     condensable : ``loads`` plus the nodal forces of the eigenstrain in an elastic body [N]
@@ -62,7 +60,7 @@ class Discretisation(Nodes, Part):
     """
 
     body: Body
-    kinematics: Kinematics
+    undeformed: Deformation
 
     def __init__(self, body: Body) -> None:
         super().__init__(body)
@@ -73,7 +71,7 @@ class Discretisation(Nodes, Part):
                            for b in self.basis.basis])  # fmt: skip
         gradients = np.array([b[0].grad for b in self.basis.basis]).swapaxes(0, 1)
         mean = kind.mean_dilatation and body.kinematics != "plane_stress"
-        self.kinematics = self._measure(values, gradients, mean=mean)
+        self.undeformed = self._measure(values, gradients, mean=mean)
         self.moving = tuple(load for load in body.every_load if load.moves)
         self._moved: tuple[float, Array] = (np.nan, np.zeros(0))
         self.loads = nodal_forces(self)
@@ -84,8 +82,8 @@ class Discretisation(Nodes, Part):
         self.softening = Softening.of(self, self.positions, elements)
         self._hold()
 
-    def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Kinematics:
-        """Return how strain follows from displacements, given the shape functions at the points.
+    def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Deformation:
+        """Return the body before loading, given the shape functions at the points.
 
         Parameters
         ----------
@@ -95,17 +93,10 @@ class Discretisation(Nodes, Part):
         B = strain_operator(values, gradients, self.points[0], self.body.kinematics)
         return self._small_strain(mean_dilatation(B, self.weights) if mean else B)
 
-    def _small_strain(self, B: Array) -> SmallStrain:
-        """Return small strain with the operator B of the elements."""
+    def _small_strain(self, B: Array) -> Deformation:
+        """Return the body before loading for small strain, with the operator B of the elements."""
         at_rest = np.zeros((self.components, self.weights.size))
-        return SmallStrain(
-            Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
-        )
-
-    @property
-    def undeformed(self) -> Deformation:
-        """The body before loading."""
-        return self.kinematics.undeformed
+        return Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
 
     def _hold(self) -> None:
         """Find the held unknowns, the free rigid motions, and one pin for each of these."""
@@ -149,7 +140,7 @@ class Discretisation(Nodes, Part):
 
     def strain(self, u: Array) -> Array:
         """Return Mandel strain (n_components, n_points) for displacements (n,)."""
-        return self.kinematics.at(u).strain
+        return self.undeformed.at(u).strain
 
     def law(self, time: float) -> Law:
         """Return the material law of its points at a time; temperature may change it."""
@@ -166,7 +157,7 @@ class Discretisation(Nodes, Part):
 
     def respond(self, u: Array, state: PlasticState, time: float) -> PartResponse:
         """Return stress, tangent and new state at all points; the tangent is symmetric."""
-        deformation = self.kinematics.at(u)
+        deformation = self.undeformed.at(u)
         return PartResponse(self._stressed(deformation.strain, state, time), deformation, (u, time))
 
     def _stressed(self, strain: Array, state: PlasticState, time: float) -> Response:

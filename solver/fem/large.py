@@ -11,9 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.fem.deformation import Kinematics, PartResponse
+from solver.fem.deformation import Deformation, PartResponse
 from solver.fem.discretisation import Discretisation
-from solver.fem.log_strain import LogStrain, gradient_operator
+from solver.fem.log_strain import LogDeformation, gradient_operator
 from solver.fem.nodes import Dofs, vectors
 from solver.fem.surface import edges_of
 from solver.materials import PlasticState, Response
@@ -107,9 +107,10 @@ class LargeDiscretisation(Discretisation):
         loads = [load for load in self.body.every_load if load.follows]
         return [_Follower(self, load, b) for load in loads for b in load.boundaries]
 
-    def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Kinematics:
+    def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Deformation:
         g = gradient_operator(values, gradients, self.points[0], self.body.kinematics)
-        return LogStrain(n=self.n, dofs=self.dofs, gradients=g, weights=self.weights, mean=mean)
+        at_rest = np.zeros(self.n)
+        return LogDeformation.of(self.n, self.dofs, g, self.weights, at_rest, mean=mean)
 
     def external(self, time: float, u: Array | None = None) -> Array:
         """Return the external nodal forces (n,) at a time and displacements (n,) [N]."""

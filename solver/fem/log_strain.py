@@ -23,8 +23,7 @@ C. Miehe, N. Apel, M. Lambrecht, Comput. Methods Appl. Mech. Engrg 191 (2002) 53
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -171,6 +170,31 @@ class LogDeformation(Deformation):
     mean: bool
     linear: ClassVar[bool] = False
 
+    @classmethod
+    def of(
+        cls, n: int, dofs: Ints, gradients: Array, weights: Array, u: Array, *, mean: bool
+    ) -> Self:
+        """Return a body at displacements u (n,) [mm]; strain is NaN at inverted points."""
+        rows = gradients.shape[2]
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            stretch = _Stretch.of(_at_points(gradients, u[dofs]))
+            along = np.einsum("av...,vi...->...ai", stretch.by_functions(), stretch.by_gradient())
+            E = stretch.strain()
+        B = np.matmul(along[..., :rows], gradients)
+        if mean:
+            B = mean_dilatation(B, weights)
+            trace = E[:3].sum(axis=0)
+            average = (trace * weights).sum(axis=1) / weights.sum(axis=1)
+            E[:3] += (average[:, None] - trace) / 3
+        return cls(
+            n=n, dofs=dofs, strain=E.reshape(4, -1), B=B, weights=weights, gradients=gradients,
+            stretch=stretch, mean=mean,
+        )  # fmt: skip
+
+    def at(self, u: Array) -> Self:
+        """See `Deformation`."""
+        return self.of(self.n, self.dofs, self.gradients, self.weights, u, mean=self.mean)
+
     def _conjugate(self, stress: Array) -> Array:
         """Return the stress (4, n_elements, n_points) that is conjugate to E at each point."""
         T = stress.reshape(4, *self.weights.shape)
@@ -225,49 +249,6 @@ def _at_points(gradients: Array, u: Array) -> Array:
     flat = np.matmul(gradients.reshape(elements, points * rows, m), u[:, :, None])
     H[:rows] = np.moveaxis(flat.reshape(elements, points, rows), 2, 0)
     return H
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class LogStrain:
-    """Logarithmic strain of plane and axisymmetric bodies.
-
-    Attributes
-    ----------
-    n : number of unknowns
-    dofs : (n_elements, m) unknowns of the elements
-    gradients : see `LogDeformation`
-    weights : (n_elements, n_points) volume of the points [mm3]
-    mean : whether the volumetric strain is the mean over each element
-    """
-
-    n: int
-    dofs: Ints
-    gradients: Array
-    weights: Array
-    mean: bool
-
-    @cached_property
-    def undeformed(self) -> LogDeformation:
-        """The body before loading."""
-        return self.at(np.zeros(self.n))
-
-    def at(self, u: Array) -> LogDeformation:
-        """Return the body at displacements (n,) [mm]; strain is NaN at inverted points."""
-        rows = self.gradients.shape[2]
-        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            stretch = _Stretch.of(_at_points(self.gradients, u[self.dofs]))
-            along = np.einsum("av...,vi...->...ai", stretch.by_functions(), stretch.by_gradient())
-            E = stretch.strain()
-        B = np.matmul(along[..., :rows], self.gradients)
-        if self.mean:
-            B = mean_dilatation(B, self.weights)
-            trace = E[:3].sum(axis=0)
-            mean = (trace * self.weights).sum(axis=1) / self.weights.sum(axis=1)
-            E[:3] += (mean[:, None] - trace) / 3
-        return LogDeformation(
-            n=self.n, dofs=self.dofs, strain=E.reshape(4, -1), B=B, weights=self.weights,
-            gradients=self.gradients, stretch=stretch, mean=self.mean,
-        )  # fmt: skip
 
 
 def gradient_operator(values: Array, gradients: Array, radius: Array, kinematics: str) -> Array:

@@ -122,7 +122,7 @@ class Windowed(Discretisation):
         """Set the elements of the window, and the quantities at their points."""
         self.dofs = number[whole.dofs[self.elements]]
         self.weights = whole.weights[self.elements]
-        self.kinematics = self._small_strain(whole.undeformed.B[self.elements])
+        self.undeformed = self._small_strain(whole.undeformed.B[self.elements])
         self.points = whole.points[:, self.elements]
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)

@@ -21,7 +21,7 @@ from solver.contact import candidates, complementarity
 from solver.contact.problem import OPEN, STICK, ContactSolution
 from solver.contact.system import System
 from solver.fem import discretisation, substructure
-from solver.fem.deformation import PartResponse, SmallStrain
+from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation
 from solver.fem.wheel import Wheel
 from solver.loading.program import Tolerances
@@ -172,7 +172,7 @@ def other_material(*, stiff: float = 1.0, moves: float = 1.0) -> Fault:
 
     def with_other(self: Any, u: Any, state: Any, time: float) -> Any:
         del time
-        deformation = self.kinematics.at(u)
+        deformation = self.undeformed.at(u)
         return PartResponse(other(self.body).law.respond(deformation.strain, state), deformation)
 
     def fault(patch: Patch) -> None:
@@ -226,7 +226,7 @@ def heavier_points(patch: Patch) -> None:
     def heavier(self: Any, body: Any) -> None:
         build(self, body)
         self.weights = 1.1 * self.weights
-        self.kinematics = SmallStrain(replace(self.undeformed, weights=self.weights))
+        self.undeformed = replace(self.undeformed, weights=self.weights)
 
     patch.setattr(Discretisation, "__init__", heavier)
 
