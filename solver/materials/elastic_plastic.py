@@ -25,7 +25,7 @@ from solver.materials.principal_return import principal_return
 from solver.materials.radial_return import LinearHardening, radial_return
 from solver.materials.smooth_surface import SmoothSurface
 from solver.materials.state import PlasticState, Response
-from solver.materials.yield_surface import Tresca, VonMises
+from solver.materials.yield_surface import IsotropicSurface, Tresca, VonMises
 from solver.parameters import Checked, Fraction, HardeningRatio, Infinite, Modulus, Poisson
 from solver.typing import Array
 
@@ -38,7 +38,7 @@ class ElasticPlastic(Law):
             raise ModelError("youngs_modulus", math.inf, "must be finite [MPa]")
 
     @attribute
-    def surface(self) -> VonMises | Tresca | SmoothSurface:
+    def surface(self) -> VonMises | IsotropicSurface:
         """The shape of the yield surface."""
         return VonMises()
 

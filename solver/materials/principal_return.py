@@ -2,51 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
-
 import numpy as np
 
 from solver.materials.curves import Curve
 from solver.materials.elasticity import Elasticity
-from solver.materials.scalar import falling_root
 from solver.materials.state import PlasticState, Response
+from solver.materials.yield_surface import IsotropicSurface
 from solver.tensors import PAIRS, dyad, principal, von_mises
 from solver.typing import Array
 
 _ALIKE = 1e-10
 """Ratio of the difference of two principal stresses to the largest one; up to it they are equal."""
-
-
-class Returned(NamedTuple):
-    """The plastic increment in principal values.
-
-    ``flow`` (3, n) plastic strains; ``growth`` (n,) multiplier; ``derivative`` (3, 3, n) of stress
-    by trial stress.
-    """
-
-    flow: Array
-    growth: Array
-    derivative: Array
-
-
-class IsotropicSurface(Protocol):
-    """A yield surface that depends on principal stresses alone."""
-
-    @property
-    def over_mises(self) -> float:
-        """Upper bound of the ratio of its equivalent stress to that of von Mises."""
-
-    def of_principal(self, values: Array) -> Array:
-        """Return the equivalent stress (n,) of principal stresses (3, n), largest first [MPa]."""
-
-    def returned(self, trial: Array, before: Array, G: float, curve: Curve) -> Returned:
-        """Return the plastic increment for principal trial stresses beyond the surface.
-
-        Parameters
-        ----------
-        trial : (3, n) principal trial stresses s1 >= s2 >= s3 [MPa]
-        before : (n,) p, the accumulated plastic strain
-        """
 
 
 def principal_return(
@@ -109,22 +75,3 @@ def principal_return(
         turn += np.where(alike, limit, ratio) * mixed[:, None] * mixed[None]
     tangent[:, :, at] = np.einsum("abn,bc->acn", turn, C)
     return Response(stress, tangent, PlasticState(plastic_strain, accumulated), yielding)
-
-
-def grown(stiff: float | Array, trial: Array, before: Array, curve: Curve) -> tuple[Array, Array]:
-    """Return dp (n,) that solves ``stiff dp + R(p + dp) = trial``, and the slopes of R (n,) [MPa].
-
-    Parameters
-    ----------
-    stiff : fall of the elastic stress per unit of the multiplier [MPa]
-    trial : (n,) stress without plastic flow, not below R(p) [MPa]
-    before : (n,) p, the accumulated plastic strain
-    """
-
-    def excess(growth: Array) -> tuple[Array, Array]:
-        p = before + growth
-        return trial - stiff * growth - curve.flow_stress(p), -stiff - curve.slope(p)
-
-    most = np.maximum(trial - curve.flow_stress(before), 0.0) / stiff
-    growth = falling_root(excess, np.zeros_like(most), most * (1 + 1e-9), np.abs(trial))
-    return growth, curve.slope(before + growth)

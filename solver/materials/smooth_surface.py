@@ -16,9 +16,8 @@ import numpy as np
 
 from solver.errors import ModelError
 from solver.materials.curves import Curve
-from solver.materials.principal_return import Returned, grown
 from solver.materials.scalar import falling_root
-from solver.materials.yield_surface import Tension, YieldSurface
+from solver.materials.yield_surface import IsotropicSurface, Returned, Tension, grown
 from solver.tensors import dyad, principal
 from solver.typing import Array
 
@@ -89,7 +88,7 @@ def _stresses(angle: Any) -> Any:
     return np.stack([s3 + second + first, s3 + second, s3])
 
 
-class SmoothSurface(YieldSurface):
+class SmoothSurface(IsotropicSurface):
     """A smooth convex yield surface; subclasses are frozen dataclasses of their parameters."""
 
     __slots__ = ()
@@ -122,7 +121,7 @@ class SmoothSurface(YieldSurface):
 
     @property
     def over_mises(self) -> float:
-        """Upper bound of the ratio of its equivalent stress to that of von Mises.
+        """See `IsotropicSurface`.
 
         A convex section through the points of tension and compression lies outside the hexagon
         with these corners.
@@ -136,13 +135,9 @@ class SmoothSurface(YieldSurface):
         return tension / ratio
 
     def of_principal(self, values: Array) -> Array:
-        """Return the equivalent stress (n,) of principal stresses (3, n), largest first [MPa]."""
+        """Return the equivalent stress (n,) of principal stresses [MPa]."""
         size, angle = polar(values)
         return size * self._size(angle)
-
-    def equivalent(self, stress: Array) -> Array:
-        """Return the equivalent tensile stress (n_points,) of Mandel stress [MPa]."""
-        return self.of_principal(principal(stress)[0])
 
     def normal(self, stress: Array) -> Array:
         """Return the derivative (n_components, n_points) of `equivalent`; zero without deviator."""
@@ -198,11 +193,6 @@ class SmoothSurface(YieldSurface):
            larger below the root and smaller above it
         3. derivative: (I + 2 G dp H)^-1 less its part along the normal, where H = (f + f'') / r is
            the curvature across
-
-        Parameters
-        ----------
-        trial : (3, n) principal trial stresses s1 >= s2 >= s3 beyond the surface [MPa]
-        before : (n,) p, the accumulated plastic strain
         """
         size, angle = polar(trial)
         first = curve.flow_stress(before)

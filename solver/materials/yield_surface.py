@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, TypeVar
+from typing import ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
 from solver.materials.curves import Curve
-from solver.materials.principal_return import Returned, grown
+from solver.materials.scalar import falling_root
 from solver.tensors import PAIRS, deviator, dyad, principal, von_mises
 from solver.typing import Array
 
@@ -19,6 +19,18 @@ _NOTHING = 1e-300
 _FACE = np.array([1.0, 0.0, -1.0])
 _EDGES = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0]])
 """Flow on the second face at the edges s2 = s3 and s1 = s2; `_FACE` is that on face s1 - s3."""
+
+
+class Returned(NamedTuple):
+    """The plastic increment in principal values.
+
+    ``flow`` (3, n) plastic strains; ``growth`` (n,) multiplier; ``derivative`` (3, 3, n) of stress
+    by trial stress.
+    """
+
+    flow: Array
+    growth: Array
+    derivative: Array
 
 
 class YieldSurface(ABC):
@@ -67,6 +79,35 @@ class YieldSurface(ABC):
         return np.asarray(np.abs(flow - growth * self.normal(stress)).max(axis=0))
 
 
+class IsotropicSurface(YieldSurface):
+    """A yield surface given by principal stresses (3, n), the largest first [MPa]."""
+
+    __slots__ = ()
+
+    @property
+    @abstractmethod
+    def over_mises(self) -> float:
+        """Upper bound of the ratio of its equivalent stress to that of von Mises."""
+
+    @abstractmethod
+    def of_principal(self, values: Array) -> Array:
+        """Return the equivalent stress (n,) of principal stresses [MPa]."""
+
+    def equivalent(self, stress: Array) -> Array:
+        """Return the equivalent tensile stress (n_points,) of Mandel stress [MPa]."""
+        return self.of_principal(principal(stress)[0])
+
+    @abstractmethod
+    def returned(self, trial: Array, before: Array, G: float, curve: Curve) -> Returned:
+        """Return the plastic increment for principal trial stresses beyond the surface.
+
+        Parameters
+        ----------
+        trial : (3, n) principal trial stresses [MPa]
+        before : (n,) p, the accumulated plastic strain
+        """
+
+
 @dataclass(frozen=True, slots=True)
 class VonMises(YieldSurface):
     """The von Mises surface: yield depends only on the size of the deviator."""
@@ -90,7 +131,7 @@ class VonMises(YieldSurface):
 
 
 @dataclass(frozen=True, slots=True)
-class Tresca(YieldSurface):
+class Tresca(IsotropicSurface):
     """The Tresca surface: yield depends only on the largest shear stress.
 
     In principal stresses it is a hexagonal prism. On its edges, where two principal stresses are
@@ -98,19 +139,19 @@ class Tresca(YieldSurface):
     """
 
     has_corners: ClassVar[bool] = True
-    over_mises: ClassVar[float] = 2 / math.sqrt(3)
+
+    @property
+    def over_mises(self) -> float:
+        """The ratio at pure shear."""
+        return 2 / math.sqrt(3)
 
     def shear(self, tension: Tension) -> Tension:
         """Return k = tension / 2 [MPa]."""
         return tension / 2
 
     def of_principal(self, values: Array) -> Array:
-        """Return s1 - s3 (n,) of principal stresses (3, n), the largest first [MPa]."""
+        """Return s1 - s3 (n,) [MPa]."""
         return np.asarray(values[0] - values[2])
-
-    def equivalent(self, stress: Array) -> Array:
-        """Return s1 - s3 (n_points,) of Mandel stress (n_components, n_points) [MPa]."""
-        return self.of_principal(principal(stress)[0])
 
     def normal(self, stress: Array) -> Array:
         """Return e1 e1 - e3 e3 (n_components, n_points); on an edge, the normal of one face."""
@@ -129,11 +170,6 @@ class Tresca(YieldSurface):
         2. if that changes the order of the stresses, return to the edge: flow on two faces with
            multipliers a and b, dp = a + b. With the differences f1 and f2 of trial stresses on
            them: 3 G dp + R(p + dp) = (f1 + f2) / 2 and a - b = (f1 - f2) / (2 G)
-
-        Parameters
-        ----------
-        trial : (3, n) principal trial stresses s1 >= s2 >= s3 beyond the surface [MPa]
-        before : (n,) p, the accumulated plastic strain
 
         References
         ----------
@@ -187,3 +223,22 @@ def _on_edge(trial: Array, before: Array, G: float, curve: Curve) -> Returned:
     stiff = 2 * G / (3 * G + slope)
     out = stiff * mean[:, None] * mean[None] + 2 * half[:, None] * half[None]
     return Returned(edge, both, np.eye(3)[:, :, None] - out)
+
+
+def grown(stiff: float | Array, trial: Array, before: Array, curve: Curve) -> tuple[Array, Array]:
+    """Return dp (n,) that solves ``stiff dp + R(p + dp) = trial``, and the slopes of R (n,) [MPa].
+
+    Parameters
+    ----------
+    stiff : fall of the elastic stress per unit of the multiplier [MPa]
+    trial : (n,) stress without plastic flow, not below R(p) [MPa]
+    before : (n,) p, the accumulated plastic strain
+    """
+
+    def excess(growth: Array) -> tuple[Array, Array]:
+        p = before + growth
+        return trial - stiff * growth - curve.flow_stress(p), -stiff - curve.slope(p)
+
+    most = np.maximum(trial - curve.flow_stress(before), 0.0) / stiff
+    growth = falling_root(excess, np.zeros_like(most), most * (1 + 1e-9), np.abs(trial))
+    return growth, curve.slope(before + growth)

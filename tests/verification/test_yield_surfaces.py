@@ -16,7 +16,7 @@ from solver.materials import (
     TrescaMaterial,
     Voce,
 )
-from solver.materials.principal_return import Returned
+from solver.materials.yield_surface import Returned
 from solver.mesh import grid
 from tests.solver.yield_surfaces import Hosford
 from tests.verification import test_prandtl as prandtl
