@@ -33,44 +33,29 @@ ADVANCE_ERROR = declare(
     "advance_error",
     "estimated error of residual stress under mid-track by the advance of increments", "MPa",
 )  # fmt: skip
-SURFACE = {
-    "x": declare(
-        "surface_residual_x",
-        "residual stress xx at the surface, mid-track, recovered at its nodes", "MPa",
-    ),
-    "z": declare(
-        "surface_residual_z",
-        "residual stress zz at the surface, mid-track, recovered at its nodes", "MPa",
-    ),
-}  # fmt: skip
-FIRST_ROW = {
-    "x": declare(
-        "first_row_residual_x",
-        "residual stress xx at the first row of integration points, mid-track", "MPa",
-    ),
-    "z": declare(
-        "first_row_residual_z",
-        "residual stress zz at the first row of integration points, mid-track", "MPa",
-    ),
-}  # fmt: skip
-FREE_SURFACE = {
-    "x": declare(
-        "free_surface_residual_x",
-        "residual stress xx at the surface, mid-track, by the conditions of a free surface", "MPa",
-    ),
-    "z": declare(
-        "free_surface_residual_z",
-        "residual stress zz at the surface, mid-track, by the conditions of a free surface", "MPa",
-    ),
-}  # fmt: skip
-LOWEST = {
-    "x": declare("lowest_residual_x", "smallest residual stress xx under mid-track", "MPa"),
-    "z": declare("lowest_residual_z", "smallest residual stress zz under mid-track", "MPa"),
-}
-DEPTH_OF_LOWEST = {
-    "x": declare("depth_of_lowest_residual_x", "depth of the smallest residual stress xx", "mm"),
-    "z": declare("depth_of_lowest_residual_z", "depth of the smallest residual stress zz", "mm"),
-}
+
+
+def _of_axes(name: str, long_name: str, units: str = "MPa") -> dict[str, Quantity]:
+    """Declare a variable for the residual stress xx, and for zz; ``{0}`` is the axis."""
+    return {axis: declare(name.format(axis), long_name.format(axis), units) for axis in "xz"}
+
+
+SURFACE = _of_axes(
+    "surface_residual_{0}",
+    "residual stress {0}{0} at the surface, mid-track, recovered at its nodes",
+)
+FIRST_ROW = _of_axes(
+    "first_row_residual_{0}",
+    "residual stress {0}{0} at the first row of integration points, mid-track",
+)
+FREE_SURFACE = _of_axes(
+    "free_surface_residual_{0}",
+    "residual stress {0}{0} at the surface, mid-track, by the conditions of a free surface",
+)
+LOWEST = _of_axes("lowest_residual_{0}", "smallest residual stress {0}{0} under mid-track")
+DEPTH_OF_LOWEST = _of_axes(
+    "depth_of_lowest_residual_{0}", "depth of the smallest residual stress {0}{0}", "mm"
+)
 FIRST_ROW_DEPTH = declare(
     "first_row_depth", "depth of the first row of integration points, mid-track", "mm"
 )
