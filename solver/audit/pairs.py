@@ -23,7 +23,6 @@ import numpy as np
 
 from solver.audit.plain import LEAST
 from solver.audit.surfaces import PairState, Surfaces, deformed
-from solver.contact.pressure import contact_pressure
 from solver.contact.state import Converged, State
 from solver.contact.system import System
 from solver.fem.error import ErrorPoints
@@ -203,7 +202,7 @@ class AuditedPair:
         cut = self._closed & (self.measured.area < _CUT * slave.hats)
         if not cut.any():
             return ()
-        pressure, _ = contact_pressure(self._system, self._state, self._number)
+        pressure, _ = self._system.pressure(self._state, self._number)
         near = cut | np.append(cut[1:], False) | np.append(False, cut[:-1])
         at = int(np.where(near, pressure, -np.inf).argmax())
         if pressure[at] < pressure.max():
@@ -310,7 +309,7 @@ def contact_error(system: System, converged: Converged) -> float:
     error, level = 0.0, 0.0
     recovered: dict[str, Array] = {}
     for k, pair in enumerate(system.model.contacts):
-        at_vertices, _ = contact_pressure(system, converged.state, k)
+        at_vertices, _ = system.pressure(converged.state, k)
         if not at_vertices.any():
             continue
         name, boundary = pair.slave if pair.slave[0] in system.names else pair.master

@@ -21,7 +21,6 @@ from solver.audit.links import least_energy, links_error, turned
 from solver.audit.pairs import AuditedPair, contact_error
 from solver.audit.plain import LEAST, PlainBody
 from solver.audit.theory import accumulated_strain, elastic_strain, plastic_strain
-from solver.contact.pressure import contact_pressure
 from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.fem.discretisation import Discretisation
@@ -175,7 +174,7 @@ def _strength(system: System, loaded: Converged) -> dict[str, float]:
     shear, friction = 0.0, 0.0
     for k, interface in enumerate(system.interfaces):
         state, start = loaded.state, loaded.start
-        pressure, tangential = contact_pressure(system, state, k)
+        pressure, tangential = system.pressure(state, k)
         bound = system.bound(k, system.pairing(state, k), start, state.time).least(pressure)
         for number, _, _ in interface.sides:
             part = system.parts[number]

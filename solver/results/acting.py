@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from solver.contact.pressure import contact_pressure
 from solver.contact.problem import STICK
 from solver.contact.state import Converged
 from solver.contact.system import System
@@ -185,7 +184,7 @@ def contact_result(system: System, at: Converged, pair: int = 0) -> ContactResul
     interface, state, contact = system.interfaces[pair], at.state, at.state.contacts[pair]
     chain = interface.slave_surface
     X = chain.X[:, chain.vertices]
-    pressure, shear = contact_pressure(system, state, pair)
+    pressure, shear = system.pressure(state, pair)
     pairing = system.pairing(state, pair)
     gap = np.where(np.isfinite(pairing.gap), pairing.gap, np.nan)
     closed = contact.normal > 0

@@ -21,10 +21,10 @@ import numpy as np
 from solver.errors import ModelError
 from solver.fatigue.criteria import CRITERIA, Assessment, Criterion, DangVan
 from solver.fatigue.paths import Paths
+from solver.results.fields import Passed, StressCycle
 from solver.results.quantities import along_axes, declare, declare_along, placed
 from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import CLOSED, QUIET
-from solver.results.stress_cycle import Passed, StressCycle
 from solver.results.view import Places
 from solver.tensors import AXES, to_tensor
 from solver.typing import Array, Bools

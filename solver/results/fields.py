@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -17,7 +17,7 @@ from solver.results.body_fields import BodyValues
 from solver.results.mesh_fields import MeshFields, counterclockwise
 from solver.results.view import Places, View
 from solver.tensors import not_below_zero, to_tensor, von_mises
-from solver.typing import Array
+from solver.typing import Array, Ints
 
 _MOST = 8
 """Number of values in a `Remembered` cache."""
@@ -57,6 +57,32 @@ class Bodies(Protocol):
 
     def state(self, name: str, converged: Any) -> BodyState:
         """Return the state of a body."""
+
+
+class StressCycle(NamedTuple):
+    """Different cycles of the points of a body.
+
+    Attributes
+    ----------
+    stress, strain : (n, n_instants, n_components), tensor components; NaN where not known
+    grown : (n,) plastic strain that the cycle accumulates
+    net : (n,) equivalent of the signed plastic strain that it leaves
+    of : (n_points,) the cycle of each point
+    """
+
+    stress: Array
+    strain: Array
+    grown: Array
+    net: Array
+    of: Ints
+
+
+@runtime_checkable
+class Passed(Protocol):
+    """A body of which one state under the load is a whole cycle."""
+
+    def cycle(self, loaded: Any) -> StressCycle:
+        """Return the cycle of a pass."""
 
 
 _POSITIVE = ("mises", "plastic_strain")

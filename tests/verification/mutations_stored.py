@@ -366,7 +366,7 @@ def pressure_times(factor: float) -> Fault:
     def make(old: Any) -> Any:
         return lambda *a, **k: tuple(factor * each for each in old(*a, **k))
 
-    return instead(solver.results.acting, "contact_pressure", make)
+    return instead(solver.contact.system.System, "pressure", make)
 
 
 def acting_otherwise(**changes: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from solver.audit import pairs
 from solver.audit.report import estimated_error
+from solver.contact.system import System
 from solver.fem.error import ErrorPoints
 from solver.fem.fields import Sampler, recovery
 from solver.tensors import SQRT2
@@ -181,10 +181,8 @@ def test_pressure_that_is_rounding_has_no_error(monkeypatch):
     """As where stages of the user's own unload a contact: 1e-14 MPa are left of it."""
     solution = hertz_line.press(1.5)
     assert solution.audit().figures["audit_error_contact"] > 0.1
-    acting = pairs.contact_pressure
+    acting = System.pressure
     monkeypatch.setattr(
-        pairs,
-        "contact_pressure",
-        lambda *which: tuple(1e-12 * each for each in acting(*which)),
+        System, "pressure", lambda *which: tuple(1e-12 * each for each in acting(*which))
     )
     assert solution.audit().figures["audit_error_contact"] == 0.0

@@ -12,7 +12,7 @@ from solver.contact.state import BodyState
 from solver.fem.fields import Sampler, recovery
 from solver.fem.rigid import RigidMotion
 from solver.results.acting import Acting, contact_patches
-from solver.results.stress_cycle import StressCycle
+from solver.results.fields import StressCycle
 from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.track import Track, of_layers, under_load

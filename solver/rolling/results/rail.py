@@ -21,8 +21,8 @@ from solver.materials.state import PlasticState
 from solver.memory import kept
 from solver.model.body import Body
 from solver.results.acting import Acting
+from solver.results.fields import StressCycle
 from solver.results.mesh_fields import MeshFields, counterclockwise
-from solver.results.stress_cycle import StressCycle
 from solver.rolling.load import LOADED, RELEASED
 from solver.rolling.passing import Pass
 from solver.rolling.rail.flow import PrismState

@@ -8,7 +8,7 @@ from typing import Any
 
 from solver.contact.state import BodyState
 from solver.materials.state import PlasticState
-from solver.results.stress_cycle import StressCycle
+from solver.results.fields import StressCycle
 from solver.rolling.passing import Pass
 from solver.typing import Array
 
