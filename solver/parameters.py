@@ -132,7 +132,11 @@ _Wrong = tuple[str, Any, str]
 
 
 class Checked:
-    """Base of frozen dataclasses whose values are checked when they are built: see `check`."""
+    """Base of frozen dataclasses whose values are checked when they are built: see `check`.
+
+    A subclass that overrides `__post_init__` names the base whose method it calls: zero-argument
+    ``super()`` does not see the class that ``dataclass(slots=True)`` makes.
+    """
 
     __slots__ = ()
 

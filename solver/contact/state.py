@@ -219,7 +219,7 @@ class Converged:
     windows : for each part, the region of the window in which it was solved; None without
     beside : the same increment of the neighbouring runs (`solver.derivatives`), if there are any
     near : of a neighbouring run, the nearest switch since the path began, in differences of its
-        parameter: see `solver.derivatives.switches`
+        parameter: see `solver.derivatives.neighbours`
     """
 
     start: State

@@ -26,7 +26,7 @@ def derive(
 
     The model is solved once. Its derivatives follow increment by increment, through plastic flow,
     contact and friction: see `solver.derivatives.neighbours`. A warning is logged if they may be
-    one-sided: see `solver.derivatives.switches`.
+    one-sided: see `solver.derivatives.neighbours`.
 
     Parameters
     ----------

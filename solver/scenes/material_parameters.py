@@ -61,7 +61,6 @@ class MaterialParameters(HardeningParameters):
     yield_stress: Stress = described(350.0, "uniaxial yield stress Re")
 
     def __post_init__(self) -> None:
-        # zero-argument super() does not see the class that dataclass(slots=True) makes
         YieldParameters.__post_init__(self)
         self.material()  # raises an error for parameters that do not fit together
 

@@ -96,7 +96,6 @@ class PunchParameters(ContactParameters):
     unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(5, "increments of unloading")
 
     def __post_init__(self) -> None:
-        # zero-argument super() does not see the class that dataclass(slots=True) makes
         ContactParameters.__post_init__(self)
         under, beyond, up, down = (len(each) - 1 for each in self.lines)
         elements = under * up + (under + beyond) * down

@@ -13,7 +13,7 @@ _AHEAD, _BEHIND, _DEEP = 3.0, 5.0, 4.0
 """Extent of the window ahead of, behind and below the load, over the half-width. With only 3
 half-widths behind a load with shear, stress near the surface has an error of 5 MPa in 500, because
 points at yield still flow there. With elements that grow behind the load the error is 30 MPa:
-points flow too much."""
+points flow too much. Below, element sides grow faster than by ``growth``."""
 _FAR = 1600.0
 """Distance of the sides and the bottom from the load, over the half-width. Half of this distance
 changes stress by 1 MPa in 500."""
@@ -56,9 +56,6 @@ def window_depth(a: float, reach: float = 1.0) -> float:
     return _DEEP * reach * a
 
 
-_DEEP = 4.0
-"""Depth over the Hertz half-width in which element sides grow by ``growth``; below it they grow
-faster."""
 _RECORDED = 30
 """Least number of positions of results per Hertz half-width."""
 _ROUNDING = 1e-12

@@ -23,8 +23,12 @@ from solver.errors import ModelError
 from solver.late import late
 from solver.model.friction import coefficient
 from solver.parameters import Fraction, Length, Ratio, Stress, described
-from solver.rolling.scenes.rail_scene import PrismParameters, rail_scene
-from solver.rolling.scenes.wheel_parameters import ROLLED, check_given_shear
+from solver.rolling.scenes.wheel_parameters import (
+    ROLLED,
+    PrismParameters,
+    check_given_shear,
+    rail_scene,
+)
 
 ELEMENTS: Mapping[str, int] = {"draft": 4, "standard": 6, "fine": 10}
 """Elements per semi-axis of the elastic Hertz contact: across, along, and in depth for the shorter
@@ -91,7 +95,6 @@ class RacewayParameters(PrismParameters):
     )
 
     def __post_init__(self) -> None:
-        # zero-argument super() does not see the class that dataclass(slots=True) makes
         PrismParameters.__post_init__(self)
         for name, usual in (("control", "moment"), ("lateral_creepage", 0.0)):
             value = getattr(self, name)

@@ -128,7 +128,6 @@ class RollingParameters(WheelParameters):
     unload_steps: Annotated[int, Interval(ge=1, le=1000)] = described(4, "increments of unloading")
 
     def __post_init__(self) -> None:
-        # zero-argument super() does not see the class that dataclass(slots=True) makes
         WheelParameters.__post_init__(self)
         prescribed = self.control == "creepage"
         if prescribed and self.load == "hertz":
