@@ -23,11 +23,12 @@ from solver.model.amplitude import Amplitude
 from solver.model.body import Axle
 from solver.model.pairs import ContactPair
 from solver.rolling.passing import passing
-from solver.rolling.plane.track import Track, under_load
+from solver.rolling.plane.track import under_load
 from solver.rolling.plane.wheel import flowed
 from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, rim_of
 from solver.rolling.scenes.rolling_model import wheel_body
+from tests.verification.interleaved import InterleavedTrack
 
 Array = NDArray[np.float64]
 
@@ -48,8 +49,8 @@ class SteadyIncrement:
         self.parameters = p = RollingParameters(**fields)
         self.material = p.material()
         elasticity = self.material.elasticity
-        self.track = Track(
-            p.mesh_width, p.element_size, p.growth, elasticity, reach=reach, interleaved=True
+        self.track = InterleavedTrack(
+            p.mesh_width, p.element_size, p.growth, elasticity, reach=reach
         )
         self.rim = rim_of(p)
         virgin, load = self.track.rows.virgin(self.material), load_on(self.track, p, p)

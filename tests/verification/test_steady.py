@@ -17,7 +17,8 @@ from solver.materials import PlasticState
 from solver.results.sliding_limits import melan_limit
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.rows import RowFlow
-from solver.rolling.plane.track import Track, track_of, under_load
+from solver.rolling.plane.track import track_of, under_load
+from tests.verification.interleaved import InterleavedTrack
 
 YIELD = 502.0
 K = YIELD / sqrt(3)
@@ -86,7 +87,7 @@ def test_a_steady_pass_is_a_fixed_point_of_one_increment(hardening, shear):
     An increment of one element takes each point to the place of the one two columns before.
     """
     material = steel(hardening=hardening, hardening_ratio=0.024)
-    place = Track(A, 2.0, 1.15, material.elasticity, interleaved=True)
+    place = InterleavedTrack(A, 2.0, 1.15, material.elasticity)
     load = place.hertz(4.7 * K, shear)
     (one,) = rolling(place, material, load, [1], parts=1)
     forces = load.force

@@ -33,11 +33,12 @@ from solver.rolling.audit.plane import audit_pass
 from solver.rolling.flow import CompiledFlow, SteppedFlow
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.rows import RowFlow
-from solver.rolling.plane.track import Track, track_of, under_load
+from solver.rolling.plane.track import track_of, under_load
 from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on, track_for
 from solver.shipped import SCENES
 from tests.solver.yield_surfaces import Hosford
+from tests.verification.interleaved import InterleavedTrack
 from tests.verification.steady_increment import SteadyIncrement
 
 YIELD, RATIO = 502.0, 0.024
@@ -229,7 +230,7 @@ def test_a_steady_pass_is_a_fixed_point_of_one_increment(name):
     An increment of one element takes each point to the place of the one two columns before.
     """
     law = LAWS[name]
-    track = Track(A, 4.0, 1.3, ELASTIC, interleaved=True)
+    track = InterleavedTrack(A, 4.0, 1.3, ELASTIC)
     (one,) = rolling(track, law, track.hertz(4.7 * K, 0.09), [1], parts=1)
     whole, points = np.arange(track.part.weights.size), track.rows.points
     state = under_load(track, one).plastic.at(whole)

@@ -15,10 +15,10 @@ import pytest
 from solver import System, Walker
 from solver.loading.program import Control, Tolerances
 from solver.rolling.plane.rolling import rolling
-from solver.rolling.plane.track import Track
 from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on
 from solver.rolling.scenes.rolling_model import model
+from tests.verification.interleaved import InterleavedTrack
 
 SIDE = 4.0
 FREE = {
@@ -39,7 +39,7 @@ SAME = 0.05
 def endless():
     """Depth of the rows and residual sigma_x there, mean of both chains of points."""
     p = RollingParameters(**FREE)
-    track = Track(p.mesh_width, SIDE, p.growth, p.material().elasticity, interleaved=True)
+    track = InterleavedTrack(p.mesh_width, SIDE, p.growth, p.material().elasticity)
     (one,) = rolling(track, p.material(), load_on(track, p, p), [1], parts=1)
     stress = one.after.stress(p.material().elasticity)[:, 0]
     return one.after.depth[::2], stress.reshape(-1, 2).mean(axis=1)

@@ -85,7 +85,6 @@ class FlowRows:
     operator : the inverse of its elastic stiffness, which keeps the m unknowns of the window
     ahead, behind : the window extends from x = -behind to x = ahead [mm]
     deep : depth of the window [mm]
-    interleaved : make two rows of each, of every other column
 
     Attributes
     ----------
@@ -104,26 +103,22 @@ class FlowRows:
         ahead: float,
         behind: float,
         deep: float,
-        *,
-        interleaved: bool = False,
     ) -> None:
         self.part = part
         middle = part.points.mean(axis=2)
         shallow = middle[1] > -deep
         inside = shallow & (middle[0] > -behind) & (middle[0] < ahead)
-        points = _in_rows(part, inside, deep, interleaved)
+        points = self._in_rows(inside, deep)
         self.shape = points.shape
         self.points = points
         self.weights = part.volumes[points]
         n_rows = len(points)
         length = self._length(points)
-        self.uppermost = 2 if interleaved else 1
         self.depth = -part.points[1].ravel()[points[:, 0]]
+        self.uppermost = int((self.depth - self.depth[0] < _LEVEL * deep).sum())
         self._thickness = self.weights.sum(axis=1) / length
-        self.ahead = _in_rows(part, shallow & (middle[0] > ahead), deep, interleaved)
-        self.behind = downstream = _in_rows(
-            part, shallow & (middle[0] < -behind), deep, interleaved
-        )
+        self.ahead = self._in_rows(shallow & (middle[0] > ahead), deep)
+        self.behind = downstream = self._in_rows(shallow & (middle[0] < -behind), deep)
         if len(downstream) != n_rows:
             raise ModelError("mesh", len(downstream), f"must have {n_rows} rows behind the window")
         self._strain = sparse.csr_array(self._strain_at(points)[:, operator.kept])
@@ -136,6 +131,17 @@ class FlowRows:
         self._behind = each @ sparse.kron(same, sparse.eye_array(4), format="csr")
         # condensed, this force acts only on the boundary of the window
         self._force_behind = sparse.csr_array(operator.condense(self._behind.toarray()))
+
+    def _in_rows(self, elements: Bools, deep: float) -> Ints:
+        """Return the points of elements (n_rows, n_columns), downwards and downstream."""
+        n_points = self.part.weights.shape[1]
+        points = (np.flatnonzero(elements)[:, None] * n_points + np.arange(n_points)).ravel()
+        x, y = self.part.points.reshape(2, -1)[:, points]
+        level = np.round(y / (_LEVEL * deep)).astype(np.int64)
+        depths, counts = np.unique(level, return_counts=True)
+        if len(points) == 0 or len(set(counts)) != 1:
+            raise ModelError("mesh", len(depths), "must have its points in rows of equal length")
+        return points[np.lexsort((-x, -level))].reshape(len(depths), -1)
 
     def virgin(self, law: Law) -> Layers:
         """Return the state before any load."""
@@ -217,21 +223,6 @@ class FlowRows:
     def force_behind(self, behind: Array) -> Array:
         """Return the forces on all nodes (n,) equivalent to plastic strain behind the window."""
         return np.asarray(self._behind @ behind.ravel())
-
-
-def _in_rows(part: Discretisation, elements: Bools, deep: float, interleaved: bool) -> Ints:
-    """Return the points of elements (n_rows, n_columns), downwards and downstream."""
-    n_points = part.weights.shape[1]
-    points = (np.flatnonzero(elements)[:, None] * n_points + np.arange(n_points)).ravel()
-    x, y = part.points.reshape(2, -1)[:, points]
-    level = np.round(y / (_LEVEL * deep)).astype(np.int64)
-    depths, counts = np.unique(level, return_counts=True)
-    if len(points) == 0 or len(set(counts)) != 1:
-        raise ModelError("mesh", len(depths), "must have its points in rows of equal length")
-    rows = points[np.lexsort((-x, -level))].reshape(len(depths), -1)
-    if interleaved:
-        rows = rows.reshape(len(depths), -1, 2).swapaxes(1, 2).reshape(2 * len(depths), -1)
-    return rows
 
 
 class RowFlow(FlowPast[Layers]):

@@ -50,8 +50,6 @@ class Track:
     growth : ratio of neighbouring element sides in depth
     elasticity : elastic constants of the half-plane
     reach : factor of the usual length and depth of the window
-    interleaved : make two rows of each, of every other column: their points are one element
-        apart, as in increments by which the load advances one element
 
     Raises
     ------
@@ -67,7 +65,6 @@ class Track:
         elasticity: Elasticity,
         *,
         reach: float = 1.0,
-        interleaved: bool = False,
     ) -> None:
         a, h = half_width, element_size
         if not 0 < h <= a / 2:
@@ -81,7 +78,7 @@ class Track:
         self._contact = CONTACT * reach * a
         self.part = Discretisation(half_space_body(*self._lines, self._contact, elasticity))
         self._window = h * ahead, h * behind, window_depth(a, reach)
-        self.rows = FlowRows(self.part, self.operator, *self._window, interleaved=interleaved)
+        self.rows = FlowRows(self.part, self.operator, *self._window)
 
     @cached_property
     def mirrored(self) -> Discretisation:
