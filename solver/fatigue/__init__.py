@@ -10,12 +10,12 @@ from __future__ import annotations
 from solver.late import front
 
 _HOMES = {
-    **dict.fromkeys(
-        ("Assessment", "Criterion", "PlaneCriterion", "TwoLimits", "CRITERIA", "Crossland",
-         "DangVan", "Findley", "Matake", "FatemiSocie", "SmithWatsonTopper", "BrownMiller"),
-        "criteria",
-    ),
-    "Paths": "paths", "OnPlanes": "planes", "critical_planes": "planes",
+    "Assessment": "criterion", "Criterion": "criterion", "PlaneCriterion": "criterion",
+    "TwoLimits": "criterion", "CRITERIA": "criteria", "Paths": "paths", "OnPlanes": "planes",
+    "critical_planes": "planes",
+    "Crossland": "crossland", "DangVan": "dang_van", "Findley": "findley", "Matake": "matake",
+    "FatemiSocie": "fatemi_socie", "SmithWatsonTopper": "smith_watson_topper",
+    "BrownMiller": "brown_miller",
     "stress_intensity": "cracks", "opened_range": "cracks", "held_length": "cracks",
     "archard_depth": "wear", "slip_work": "wear", "ruiz": "wear",
     "surface_index": "rolling", "subsurface_index": "rolling", "t_gamma": "rolling",

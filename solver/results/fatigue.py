@@ -19,7 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.errors import ModelError
-from solver.fatigue.criteria import CRITERIA, Assessment, Criterion, DangVan
+from solver.fatigue.criteria import CRITERIA
+from solver.fatigue.criterion import Assessment, Criterion
+from solver.fatigue.dang_van import DangVan
 from solver.fatigue.paths import Paths
 from solver.results.fields import Passed, StressCycle
 from solver.results.quantities import along_axes, declare, declare_along, placed
