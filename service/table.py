@@ -27,7 +27,7 @@ from studies.kinds import kind_of
 from studies.storage.dataset import axis_attributes
 from studies.storage.seal import state_of
 from studies.storage.store import Store
-from studies.views.rules import group_of
+from studies.views.figures import group_of
 from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_of
 
 KEPT = 8

@@ -26,7 +26,7 @@ from studies.definition.vocabulary import OK
 from studies.errors import MOST_NAMES, StudyError
 from studies.scenes.file_scene import FileScene
 from studies.toml import toml_file
-from studies.views.rules import Worst
+from studies.views.figures import Worst
 from studies.views.summary import Failed, Summary, bar, placed, summary_of
 
 if TYPE_CHECKING:

@@ -38,7 +38,14 @@ from service.jobs import Jobs
 from service.pages import study as chosen
 from service.pages.assets import asset
 from service.pages.rendering import COOKIE, ROOT, PageRoute, page, to_study
-from service.pages.run import MOST, audited, compared, numbers_shown, parameters_shown
+from service.pages.run import (
+    MOST,
+    audited,
+    compared,
+    numbers_of,
+    numbers_shown,
+    parameters_shown,
+)
 from service.routes.itself import health
 from service.routes.numbers import OUTLINED
 from service.scenes import scene_name, scene_of
@@ -49,7 +56,7 @@ from studies.errors import StudyError
 from studies.kinds import kind_of
 from studies.scenes.registry import known_names
 from studies.storage.store import Store
-from studies.views.elasticities import elasticities
+from studies.views.figures import elasticities
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)
@@ -175,14 +182,14 @@ def _study(
         kept = {k: v for k, v in {**query, **other}.items() if v not in ("", None)}
         return "?" + urlencode(kept)
 
-    part = chosen.part(table, query)
+    part, floors = chosen.part(table, query), chosen.floors_of(table)
     run = None
     if at is not None:
         run = {
             "id": table.columns[RUN].values[at],
             "status": table.columns[STATUS].values[at],
             "message": table.columns[MESSAGE].values[at],
-            "at": [(each, chosen.cell_text(each, at, {})) for each in varied(table)],
+            "at": [(each, chosen.cell_text(each, at, floors)) for each in varied(table)],
         }
     csv = urlencode({**part.where, **({"sort": part.sort} if part.sort else {})})
     return page(
@@ -192,7 +199,7 @@ def _study(
         scene_name=scene.name if scene else study["scene"],
         table=table,
         part=part,
-        cell=partial(chosen.cell_text, floors=chosen.floors_of(table)),
+        cell=partial(chosen.cell_text, floors=floors),
         number=number,
         chosen=run,
         turn=turn,
@@ -224,13 +231,14 @@ def _run(
     request: Request, run: Mapping[str, Any], store: Store, drawn: Mapping[str, Any]
 ) -> Response:
     scene = _scene_of_run(store, run["scene"])
+    numbers = numbers_of([run], scene)
     return page(
         request,
         "run",
         run=run,
         parameters=parameters_shown(run, scene),
-        audit=audited(run, scene),
-        numbers=numbers_shown(run, scene),
+        audit=audited(numbers),
+        numbers=numbers_shown(numbers),
         elasticities=elasticities(run["scalars"], run["parameters"]),
         drawn=drawn,
         data={"run": run["id"], "fields": drawn},

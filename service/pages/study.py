@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from studies.definition.vocabulary import OK
-from studies.numbers import rounding
+from studies.views.figures import FIGURES, Floors, group_of
 from studies.views.html import number
-from studies.views.rules import FIGURES, PRODUCTS, group_of
 from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, varied
 
 ROWS = 25
@@ -65,23 +64,23 @@ def rank(name: str) -> tuple[int, int]:
     return NUMBERS.index(group_of(name)), main.index(name) if name in main else len(main)
 
 
-def floors_of(table: RunTable) -> dict[str, float]:
-    """Return the size below which numbers are rounding, by unit; see `rounding`."""
-    levels: dict[str, float] = {}
-    for each in usual(table):
-        if each.unit and each.group != "audit":
-            size = float(np.nanmax(np.abs(each.values)))
-            levels[each.unit] = max(levels.get(each.unit, 0.0), size)
-    return {unit: rounding(unit, level) for unit, level in levels.items()}
+def floors_of(table: RunTable) -> Floors:
+    """Return what numbers of the runs are shown as 0."""
+    return Floors((each.unit, each.values) for each in table.numbers if each.group != "audit")
 
 
-def cell_text(column: Column, at: int, floors: Mapping[str, float]) -> str:
+def shown(column: Column, floors: Floors, at: Any = ...) -> Any:
+    """Return the values of a column, or of some of its runs, rounding as 0."""
+    values = column.values[at]
+    cleaned = column.number and column.group in NUMBERS[:-1]
+    return floors.clean(column.name, column.unit, values)[()] if cleaned else values
+
+
+def cell_text(column: Column, at: int, floors: Floors) -> str:
     """Return a value as the tables show it: four digits, a flag by its word, rounding as 0."""
-    value = column.values[at]
+    value = shown(column, floors, at)
     if column.flags and value == value:
         return str(column.flags.get(int(value), value)).replace("_", " ")
-    if column.number and column.group in NUMBERS and column.name not in PRODUCTS:
-        value = 0.0 if abs(value) < floors.get(column.unit, 0.0) else value
     return number(value)
 
 

@@ -20,7 +20,7 @@ from service.table import OUTCOMES
 from solver.late import Late
 from studies.errors import StudyError
 from studies.storage.seal import digest
-from studies.views.rules import Worst, worst
+from studies.views.figures import Worst, worst
 from studies.views.table import RUN, STATUS, RunTable, varied
 from studies.views.written import FORMS
 

@@ -18,6 +18,7 @@ from studies.numbers import number_text
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of
 from studies.views.columns import unit_text, value_text
+from studies.views.figures import FIGURES, group_of, meter, worst
 from studies.views.html import templates
 from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
@@ -25,7 +26,6 @@ from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
 from studies.views.plots.sheets import png
 from studies.views.plots.sweep import sweep_figure
-from studies.views.rules import FIGURES, group_of, meter, worst
 from studies.views.summary import placed, values_text
 from studies.views.tables import (
     BY_ACCURACY,

@@ -11,9 +11,9 @@ import xarray as xr
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError
 from studies.views.columns import in_blocks, stacked, unit_text, value_text
+from studies.views.figures import group_of
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import sweep_fields, wide_fields
-from studies.views.rules import group_of
 from studies.views.table import STATUS, Column, RunTable, one_number
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from studies.definition.sweep import labels
 from studies.definition.vocabulary import MISSING, OK
 from studies.views.columns import aligned, value_text
-from studies.views.rules import Worst
+from studies.views.figures import Worst
 
 WIDTH = 28
 """Number of characters of a bar."""

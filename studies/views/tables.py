@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, SupportsIndex
 
@@ -22,7 +22,6 @@ from studies.definition.vocabulary import LABEL_ATTRIBUTES, MISSING, OK
 from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
 from studies.kinds.kind import Kind
-from studies.numbers import rounding
 from studies.scenes.registry import scene_of
 from studies.storage.ugrid import owns
 from studies.views.columns import (
@@ -35,10 +34,9 @@ from studies.views.columns import (
     unit_text,
     value_text,
 )
-from studies.views.elasticities import derived, elasticities
+from studies.views.figures import FIGURES, Floors, derived, elasticities, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.reading import open_study
-from studies.views.rules import FIGURES, PRODUCTS, worst
 from studies.views.summary import NAMED, Failed, Summary, placed, values_text
 
 LISTED = 100
@@ -101,8 +99,8 @@ def run_cells(dataset: xr.Dataset) -> RunCells:
     units: list[str] = [_unit(dataset[name]) for name in places]
     units += ["", *(_unit(each) for _, each, _ in figures)]
     values = {name: dataset[name].to_numpy() for name in (*places, "status")}
-    levels = _levels(each for _, each, _ in figures)
-    cells = [_cells(_clean(each, levels), spoiled) for _, each, spoiled in figures]
+    floors = _floors(each for _, each, _ in figures)
+    cells = [_cells(_clean(each, floors), spoiled) for _, each, spoiled in figures]
     rows: list[list[str]] = []
     for at in np.ndindex(values["status"].shape):
         place = dict(zip(sweep_axes(dataset), at, strict=True))
@@ -112,21 +110,15 @@ def run_cells(dataset: xr.Dataset) -> RunCells:
     return RunCells(headings, units, rows, keys, len(places) + 1, marked)
 
 
-def _levels(variables: Iterable[xr.DataArray]) -> dict[str, float]:
-    """Return the largest magnitude of numbers by their unit."""
-    levels: dict[str, float] = {}
-    for each in variables:
-        if each.dtype.kind == "f":
-            size = float(np.nanmax(np.abs(each.to_numpy()), initial=0.0))
-            levels[_unit(each)] = max(levels.get(_unit(each), 0.0), size)
-    return levels
+def _floors(variables: Iterable[xr.DataArray]) -> Floors:
+    return Floors((_unit(each), each.to_numpy()) for each in variables if each.dtype.kind == "f")
 
 
-def _clean(values: xr.DataArray, levels: Mapping[str, float]) -> xr.DataArray:
+def _clean(values: xr.DataArray, floors: Floors) -> xr.DataArray:
     """Return numbers with zero for what is rounding beside others of their unit."""
-    if values.dtype.kind != "f" or values.name in PRODUCTS or not (unit := _unit(values)):
+    if values.dtype.kind != "f":
         return values
-    return values.where(~(abs(values) < rounding(unit, levels.get(unit, 0.0))), 0.0)
+    return values.copy(data=floors.clean(str(values.name), _unit(values), values.to_numpy()))
 
 
 def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:
@@ -259,9 +251,9 @@ def run_details(dataset: xr.Dataset) -> str:
         and name not in {"status", "message"}
         and not owns(str(name), each.dims)
     }
-    levels = _levels(each for name, each in shown.items() if not name.startswith(_AUDIT))
+    floors = _floors(each for name, each in shown.items() if not name.startswith(_AUDIT))
     for name, each in shown.items():
-        value = each if name.startswith(_AUDIT) else _clean(each, levels)
+        value = each if name.startswith(_AUDIT) else _clean(each, floors)
         lines.append([name, f"{_figure(value)} {_bracketed(_unit(each))}".rstrip()])
     return aligned(lines)
 

@@ -161,7 +161,7 @@ class Watched(RemoteStudy):
         }  # fmt: skip
 
     def _summary(self, detail: Any) -> Any:
-        from studies.views.rules import Worst
+        from studies.views.figures import Worst
         from studies.views.summary import Failed, summary_of
 
         name = next(iter(LIMITS))

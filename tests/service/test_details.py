@@ -17,12 +17,12 @@ from service.errors import NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import KEPT, Detail, Details
-from service.pages.run import numbers_shown, parameters_shown
+from service.pages.run import numbers_of, numbers_shown, parameters_shown
 from service.pages.study import cell_text, floors_of
 from service.schemas import StudyDetail, Window
 from service.turns import Share, Turns
 from studies import Store
-from studies.views.rules import group_of
+from studies.views.figures import group_of
 from studies.views.table import RunTable, column_of
 
 STUDY = {"name": "a", "scene": "fake", "parameters": {}, "sweep": {}}
@@ -152,8 +152,21 @@ def test_a_number_that_is_rounding_is_shown_as_zero() -> None:
         "peak_patch_pressure": 2863.0, "peak_residual_tension": 2e-5, "lateral_force": 2.8e-9,
         "longitudinal_force": 6.1, "max_plastic_strain": 1e-12,
     }  # fmt: skip
-    shown = {each["name"]: each["value"] for each in numbers_shown({"scalars": scalars}, None)}
-    assert shown == scalars | {"peak_residual_tension": 0.0, "lateral_force": 0.0}
+    shown = {
+        each.name: text for each, (text,) in numbers_shown(numbers_of([{"scalars": scalars}], None))
+    }
+    assert shown == {
+        "peak_patch_pressure": "2863", "peak_residual_tension": "0", "lateral_force": "0",
+        "longitudinal_force": "6.1", "max_plastic_strain": "1e−12",
+    }  # fmt: skip
+
+
+def test_slip_and_wear_of_rounding_are_zero_also_alone() -> None:
+    """Wear is a product, and no rounding beside other lengths, until it is no length at all."""
+    for wear, text in ((1e-11, "1e−11"), (1e-21, "0")):
+        run = {"scalars": {"wear_depth": wear, "slip_length": 1e-21}}
+        shown = {each.name: own for each, (own,) in numbers_shown(numbers_of([run], None))}
+        assert shown == {"wear_depth": text, "slip_length": "0"}
 
 
 def test_a_run_shows_the_accuracy_with_which_it_was_computed() -> None:

@@ -22,7 +22,7 @@ from service.app import create_app
 from service.errors import NotFound
 from service.jobs import Jobs
 from service.pages.form import as_toml, study_of
-from service.pages.run import audited
+from service.pages.run import audited, numbers_of
 from service.settings import Settings
 from service.turns import Share
 from studies import Store, open_netcdf, open_study
@@ -474,9 +474,9 @@ def test_a_study_of_one_run_has_a_table_and_a_page(seen: Seen) -> None:
 def test_a_page_shows_only_limits_that_every_run_has() -> None:
     """Of a wheel that rolls the reactions may be 5e-3: it does not fail by 1e-5."""
     scalars = {"audit_energy": 1e-3, "audit_reactions": 1e-3, "audit_law": 1e-9, "gap": 1.0}
-    found = audited({"scalars": scalars}, None)
-    assert [(each.name, each.kept) for each in found["limited"]] == [("audit_law", True)]
-    assert [each.name for each in found["others"]] == ["audit_energy", "audit_reactions"]
+    found = audited(numbers_of([{"scalars": scalars}], None))
+    assert [(each["of"].name, each["kept"]) for each in found["limited"]] == [("audit_law", True)]
+    assert [each["of"].name for each in found["others"]] == ["audit_energy", "audit_reactions"]
 
 
 def test_files_are_read_in_processes_of_their_own(tmp_path: Path) -> None:
