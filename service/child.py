@@ -12,11 +12,9 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from service.processes import Outlet, beat, claim_stdout, read_order, watch_stdin
+from service.processes import Outlet, beat, claim_stdout, watch_stdin
 from studies.definition.study import Study
 from studies.errors import CatalogueDamaged, GridLost, StoreBusy, StoreFull, StudyError, Unusable
-from studies.execution.access import Access
-from studies.execution.executor import Limits
 from studies.execution.run import StudyEvent, run_study
 from studies.storage.store import Store
 
@@ -36,8 +34,8 @@ def compute(order: Mapping[str, Any], outlet: Outlet, stop: threading.Event) -> 
     outcome = run_study(
         study,
         store,
-        scheduler=Access.from_dict(order["access"]),
-        limits=Limits(**order["limits"]),
+        scheduler=order["access"],
+        limits=order["limits"],
         priority=order["priority"],
         resume=True,
         since=order["since"],
@@ -57,11 +55,10 @@ def tell(event: StudyEvent, outlet: Outlet) -> None:
         log.info("run: %s %s", event.status, event.message, extra={"run": event.run})
 
 
-def main() -> None:
-    """Read the order and compute its study."""
+def main(order: Mapping[str, Any]) -> None:
+    """Compute the study of the order."""
     outlet = claim_stdout()
     beat(outlet)
-    order = read_order()
     try:
         compute(order, outlet, watch_stdin(order["grace"]))
     except (CatalogueDamaged, GridLost, StoreBusy, StoreFull, Unusable) as error:

@@ -10,7 +10,8 @@ import asyncio
 import contextlib
 import json
 import os
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from service import processes
@@ -19,6 +20,7 @@ from service.settings import Settings
 from solver.late import Late
 from studies.definition.study import Study
 from studies.errors import StoreBusy, StoreFull, StudyError
+from studies.execution.access import Access
 from studies.execution.estimate import memory_needed
 from studies.execution.forks import LOADING_SECONDS, SHARED
 from studies.storage.store import Store
@@ -33,21 +35,15 @@ class PoolAway(RuntimeError):
 
 @dataclass(slots=True)
 class Pool:
-    """The service's side of the process.
-
-    Attributes
-    ----------
-    settings : how many workers, or which scheduler
-    starter : starts the process
-    """
+    """The service's side of the process."""
 
     settings: Settings
     starter: Starter
     _process: Process | None = None
-    _access: dict[str, Any] = field(default_factory=dict)
+    _access: Access | None = None
     _one: asyncio.Lock = field(default_factory=asyncio.Lock)
 
-    async def access(self, study: dict[str, Any]) -> dict[str, Any]:
+    async def access(self, study: dict[str, Any]) -> Access:
         """Return the access to the workers; the process is started if there is none.
 
         Parameters
@@ -64,6 +60,7 @@ class Pool:
             if self._process is None or self._process.returncode is not None:
                 await self._end()
                 self._access = await self._start(study)
+            assert self._access is not None
             return self._access
 
     async def close(self) -> None:
@@ -76,10 +73,10 @@ class Pool:
             await processes.end(self._process, self.settings.grace_seconds)
             self._process = None
 
-    async def _start(self, study: dict[str, Any]) -> dict[str, Any]:
+    async def _start(self, study: dict[str, Any]) -> Access:
         order = {
             "study": study,
-            "data": str(self.settings.data),
+            "data": self.settings.data,
             "workers": self.settings.workers,
             "memory": self.settings.worker_memory,
             "access": self.settings.outside_access,
@@ -94,16 +91,15 @@ class Pool:
             async with asyncio.timeout(LOADING_SECONDS):
                 said = json.loads(await self._process.stdout.readline())
         if said.get("kind") == "access":
-            return said["content"]
+            return Access(**said["content"])
         await self._end()
         reason = said.get("content", {}).get("reason", "see the log of the service")
         raise PoolAway(f"the workers have not started: {reason}")
 
 
-def main() -> None:
+def main(order: Mapping[str, Any]) -> None:
     """Lock the store, and run the workers unless there is a scheduler, until the service stops."""
     outlet = processes.claim_stdout()
-    order = processes.read_order()
     if order["access"] is None:
         SHARED.prepare()  # as a fork of this process, which has one thread
     stop = processes.watch_stdin(order["grace"])
@@ -119,8 +115,8 @@ def main() -> None:
                     with contextlib.suppress(StudyError):  # it will be refused
                         need = memory_needed(Study.known(order["study"], store.scene))
                 own = OWN_WORKERS(workers, order["memory"], need)
-                access = held.enter_context(own).to_dict()
-            outlet.send("access", access)
+                access = held.enter_context(own)
+            outlet.send("access", asdict(access))
             stop.wait()
     except (StoreBusy, StoreFull, StudyError, RuntimeError) as error:
         outlet.send("away", {"reason": str(error)})

@@ -1,9 +1,8 @@
 """Child processes of the service, and the communication with them.
 
-All are forks of one process. Each gets its order as the first line of its standard input. The end
-of that input means "stop", whether the service stops it or has died. It sends lines of JSON on its
-standard output. It inherits the lock of the data directory until it ends: a service that starts
-after a crash waits for it.
+All are forks of one process. The end of its standard input means "stop" to each, whether the
+service stops it or has died. It sends lines of JSON on its standard output. It inherits the lock of
+the data directory until it ends: a service that starts after a crash waits for it.
 """
 
 from __future__ import annotations
@@ -84,11 +83,11 @@ class Process:
     Attributes
     ----------
     fork : its end
-    stdin, stdout : what it reads, and what it writes
+    stdin, stdout : the pipe that tells it to stop, and what it writes
     """
 
     fork: Fork
-    stdin: asyncio.WriteTransport
+    stdin: Connection
     stdout: asyncio.StreamReader
 
     @property
@@ -123,7 +122,7 @@ class Starter:
         await asyncio.to_thread(self.forks.prepare)
 
     async def start(self, module: str, order: Mapping[str, Any]) -> Process:
-        """Return a process that executes ``main()`` of a module, and has received its order.
+        """Return a process that executes ``main(order)`` of a module.
 
         Raises
         ------
@@ -133,7 +132,7 @@ class Starter:
         theirs, stdin = multiprocessing.Pipe(duplex=False)
         stdout, out = multiprocessing.Pipe(duplex=False)
         pipes = theirs, out, Connection(os.dup(self.lock))
-        begin = partial(self.forks.start, _begin, module, pipes=pipes)
+        begin = partial(self.forks.start, _begin, module, order, pipes=pipes)
         try:
             fork = await asyncio.to_thread(begin)
         finally:
@@ -141,20 +140,21 @@ class Starter:
                 each.close()
         loop, reader = asyncio.get_running_loop(), asyncio.StreamReader(LONGEST_LINE)
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), stdout)
-        writer, _ = await loop.connect_write_pipe(asyncio.BaseProtocol, stdin)
-        writer.write(json.dumps(order).encode() + b"\n")
-        return Process(fork, writer, reader)
+        return Process(fork, stdin, reader)
 
 
-def _begin(stdin: Connection, stdout: Connection, lock: Connection, module: str) -> None:
-    """Execute ``main()`` of a module in a process that has just been started."""
+def _begin(
+    stdin: Connection, stdout: Connection, lock: Connection, module: str, order: Mapping[str, Any]
+) -> None:
+    """Execute ``main(order)`` of a module in a process that has just been started."""
     os.dup2(stdin.fileno(), STDIN)
     os.dup2(stdout.fileno(), STDOUT)
     stdin.close()
     stdout.close()
     name_process(module)
     os.nice(BEHIND)
-    import_module(module).main()
+    logs.configure(os.environ.get("RESIDUA_LOG_FORMAT", "plain"), study=order.get("id", ""))
+    import_module(module).main(order)
 
 
 def name_process(module: str) -> None:
@@ -204,19 +204,6 @@ def beat(outlet: Outlet) -> None:
             time.sleep(BEAT_SECONDS)
 
     threading.Thread(target=go_on, name="beat", daemon=True).start()
-
-
-def read_order() -> dict[str, Any]:
-    """Return the order, the first line of the standard input, and configure the log."""
-    text = b""
-    while not text.endswith(b"\n"):
-        piece = os.read(STDIN, 65536)
-        if not piece:
-            raise SystemExit(0)  # the input has ended without an order
-        text += piece
-    order: dict[str, Any] = json.loads(text)
-    logs.configure(os.environ.get("RESIDUA_LOG_FORMAT", "plain"), study=order.get("id", ""))
-    return order
 
 
 def watch_stdin(grace: float) -> threading.Event:

@@ -11,7 +11,7 @@ import re
 import sys
 import time
 from collections.abc import AsyncIterator, Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from service import processes
@@ -231,9 +231,9 @@ class Runner:
         order = {
             "id": job.id,
             "study": study,
-            "data": str(self.settings.data),
+            "data": self.settings.data,
             "access": await self.pool.access(study),
-            "limits": asdict(self.settings.limits),
+            "limits": self.settings.limits,
             "priority": job.priority,
             "since": job.since,
             "grace": self.settings.grace_seconds,

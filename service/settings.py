@@ -165,13 +165,13 @@ class Settings(BaseSettings):
         return Bounds(**{each.name: getattr(self, f"max_{each.name}") for each in fields(Bounds)})
 
     @property
-    def outside_access(self) -> dict[str, Any] | None:
+    def outside_access(self) -> Access | None:
         """Access to the scheduler; None if the service starts its own workers."""
         if self.scheduler is None:
             return None
         files = {"ca": self.scheduler_ca, "cert": self.scheduler_cert, "key": self.scheduler_key}
         given = {name: str(path.resolve()) for name, path in files.items() if path}
-        return Access(self.scheduler, **given).to_dict()
+        return Access(self.scheduler, **given)
 
     @property
     def keys_required(self) -> bool:

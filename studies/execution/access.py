@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -102,15 +102,6 @@ class Access:
             allowed = "must be a file that `dask scheduler --scheduler-file` has written"
             raise StudyError("scheduler-file", str(path), allowed) from None
         return cls(str(address), ca, cert, key)
-
-    def to_dict(self) -> dict[str, str | None]:
-        """Return the content, to be sent to another process through a pipe."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, str | None]) -> Self:
-        """Return the access for a content of `to_dict`."""
-        return cls(**content)  # type: ignore[arg-type]
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from studies.execution.forks import Forks
 from tests.service.servers import PATIENCE
 
 
-def main() -> None:
+def main(order: object) -> None:
     """Say how urgent this process is, as a child of the service."""
     print(os.nice(0), flush=True)
 

@@ -177,11 +177,11 @@ def test_a_process_that_cannot_be_forked_is_an_error_of_the_system(tmp_path: Pat
 
 
 ECHO = """
-import os, sys
-def main():
+import json, os, sys
+def main(order):
     told = os.getpgid(0), os.getcwd(), os.environ["FOR_IT"]
     os.write(1, " ".join(map(str, told)).encode() + b"\\n")
-    os.write(1, os.read(0, 100))
+    os.write(1, json.dumps(order).encode() + b"\\n")
     while os.read(0, 1):
         pass
     sys.exit(3)
