@@ -18,12 +18,12 @@ import time
 import uuid
 import zlib
 from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from fnmatch import fnmatch
 from glob import glob
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from solver.files import NoFile, appearing, read_file
 from studies.errors import StoreBusy, StudyError, Unusable
@@ -45,8 +45,10 @@ Stamp = tuple[int, int]
 """Length of a blob [bytes], and its time of change [ns]."""
 
 
-class Blobs(Protocol):
-    """Blobs with names such as ``runs/<id>.nc``; each is whole, or is not there.
+class Folder:
+    """Blobs with names such as ``runs/<id>.nc``, which are the files of a directory.
+
+    Each is whole, or is not there.
 
     Attributes
     ----------
@@ -54,50 +56,16 @@ class Blobs(Protocol):
     address : what the user has called the store: a path, or an address
     """
 
-    directory: Path
-    address: Path | str
-
-    def names(self, pattern: str) -> list[str]:
-        """Return the names that match a pattern, in which ``*`` stands for no slash."""
-
-    def stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
-        """Return, by name, the stamps of those blobs that exist, in the order of the names."""
-
-    def path(self, name: str) -> Path:
-        """Return the path at which a blob can be read; if there is none, there is no file."""
-
-    def appearing(self, name: str) -> AbstractContextManager[Path]:
-        """Give a path to write to; at the end it is the blob of this name, or replaces it."""
-
-    def remove(self, name: str) -> None:
-        """Delete a blob, or all under a name, if it is there."""
-
-    def move(self, name: str, target: str) -> None:
-        """Give a damaged blob, or all under a name, another name."""
-
-    def lock(self, busy: str, shared: bool) -> AbstractContextManager[None]:
-        """Lock the store; raise `StoreBusy`, with what another process does, if it has the lock."""
-
-    def claims(self) -> Claims:
-        """Return the claims of processes that share the store."""
-
-    def follow(self) -> None:
-        """See from now on what others have changed, where that is not seen at once."""
-
-
-class Folder:
-    """Blobs that are the files of a directory."""
-
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self.address: Path | str = directory
 
     def names(self, pattern: str) -> list[str]:
-        """See `Blobs`."""
+        """Return the names that match a pattern, in which ``*`` stands for no slash."""
         return glob(pattern, root_dir=self.directory)  # noqa: PTH207 - relative, and much faster
 
     def stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
-        """See `Blobs`."""
+        """Return, by name, the stamps of those blobs that exist, in the order of the names."""
         found = {}
         for name in names:
             with suppress(FileNotFoundError):
@@ -106,30 +74,30 @@ class Folder:
         return found
 
     def path(self, name: str) -> Path:
-        """See `Blobs`."""
+        """Return the path at which a blob can be read; if there is none, there is no file."""
         return self.directory / name
 
     @contextmanager
     def appearing(self, name: str) -> Iterator[Path]:
-        """See `Blobs`."""
+        """Give a path to write to; at the end it is the blob of this name, or replaces it."""
         path = self.directory / name
         path.parent.mkdir(parents=True, exist_ok=True)
         with appearing(path) as part:
             yield part
 
     def remove(self, name: str) -> None:
-        """See `Blobs`."""
+        """Delete a blob, or all under a name, if it is there."""
         path = self.directory / name
         with suppress(FileNotFoundError):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
 
     def move(self, name: str, target: str) -> None:
-        """See `Blobs`."""
+        """Give a damaged blob, or all under a name, another name."""
         (self.directory / name).rename(self.directory / target)
 
     @contextmanager
     def lock(self, busy: str, shared: bool) -> Iterator[None]:
-        """See `Blobs`."""
+        """Lock the store; raise `StoreBusy`, with what another process does, if it has the lock."""
         held = lock(self.directory / ".lock", busy, shared=shared)
         try:
             yield
@@ -137,11 +105,11 @@ class Folder:
             os.close(held)
 
     def claims(self) -> Claims:
-        """See `Blobs`."""
+        """Return the claims of processes that share the store."""
         return Claims(self.directory / "claims")
 
     def follow(self) -> None:
-        """See `Blobs`: the files are those of all."""
+        """See from now on what others have changed; files of a directory are those of all."""
 
 
 class Bucket(Folder):
@@ -168,13 +136,13 @@ class Bucket(Folder):
         self.address, (self._fs, self._root) = address, found
 
     def names(self, pattern: str) -> list[str]:
-        """See `Blobs`."""
+        """See `Folder`."""
         found = self._listed(pattern.partition("*")[0].rpartition("/")[0])
         depth = pattern.count("/")
         return [each for each in found if fnmatch(each, pattern) and each.count("/") == depth]
 
     def stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
-        """See `Blobs`."""
+        """See `Folder`."""
         wanted = list(dict.fromkeys(names))
         if len(wanted) > _FEW:
             found = self._listed(os.path.commonpath(wanted))
@@ -183,7 +151,7 @@ class Bucket(Folder):
         return {name: stamp for name, stamp in few.items() if stamp}
 
     def path(self, name: str) -> Path:
-        """See `Blobs`: the blob is brought, unless it is there."""
+        """See `Folder`: the blob is brought, unless it is there."""
         path = super().path(name)
         if not path.exists() and (stamp := self._stamp(name)):
             with suppress(FileNotFoundError), super().appearing(name) as part:
@@ -193,7 +161,7 @@ class Bucket(Folder):
 
     @contextmanager
     def appearing(self, name: str) -> Iterator[Path]:
-        """See `Blobs`."""
+        """See `Folder`."""
         with super().appearing(name) as part:
             yield part
             self._ask("put_file", str(part), self._at(name))
@@ -201,13 +169,13 @@ class Bucket(Folder):
                 os.utime(part, ns=(stamp[1], stamp[1]))
 
     def remove(self, name: str) -> None:
-        """See `Blobs`."""
+        """See `Folder`."""
         with suppress(FileNotFoundError):
             self._ask("rm", self._at(name), recursive=True)
         super().remove(name)
 
     def move(self, name: str, target: str) -> None:
-        """See `Blobs`: if a file here is not its blob, the blobs stay, and are brought again."""
+        """See `Folder`: if a file here is not its blob, the blobs stay, and are brought again."""
         here = super().path(name)
         files = filter(Path.is_file, here.rglob("*")) if here.is_dir() else [here]
         with suppress(FileNotFoundError, NoFile):
@@ -222,7 +190,7 @@ class Bucket(Folder):
 
     @contextmanager
     def lock(self, busy: str, shared: bool) -> Iterator[None]:
-        """See `Blobs`."""
+        """See `Folder`."""
         leases = Leases(self._ask, self._at("lock"), self._own)
         with super().lock(busy, shared), ExitStack() as held:
             taken = (
@@ -233,11 +201,11 @@ class Bucket(Folder):
             yield
 
     def claims(self) -> Claims:
-        """See `Blobs`."""
+        """See `Folder`."""
         return Leases(self._ask, self._at("claims"))
 
     def follow(self) -> None:
-        """See `Blobs`: files are deleted here that differ from their blobs, or have none."""
+        """See `Folder`: files are deleted here that differ from their blobs, or have none."""
         began, there = time.time(), self._listed("")
         for pattern in _BLOBS:
             for name in super().names(pattern):
@@ -272,7 +240,7 @@ class Bucket(Folder):
             raise _unreachable(str(self.address), error) from None
 
 
-def blobs_at(place: Path | str) -> Blobs:
+def blobs_at(place: Path | str) -> Folder:
     """Return the blobs in a folder, or at an address."""
     directory = directory_of(place)
     return Bucket(directory) if (directory / ORIGIN).is_file() else Folder(directory)

@@ -8,10 +8,7 @@ names one of its parameters.
 from __future__ import annotations
 
 import json
-import sqlite3
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,23 +17,20 @@ from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.errors import CatalogueDamaged, FileDamaged, StoreBusy
 from studies.scenes.file_scene import FileScene
-from studies.storage.blobs import Blobs
+from studies.storage.blobs import Folder
 from studies.storage.database import Database
 from studies.storage.seal import State, bytes_of, check, content_of, sealed, sealed_json, state_of
 
 _FILE, _ARRAYS = "scene.json", ".arrays"
-_COLUMNS = "id, name, summary, branch, size, owner, added, parameters, state"
-_TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, PRIMARY KEY (id))"
-"""A scene that this version does not allow has no name: its size counts, and no list has it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(NamedTuple):
     """A scene in the index.
 
     Attributes
     ----------
-    id, name, summary, branch : content id, and as in `Scene`
+    id, name, summary, branch : content id, and as in `Scene`; no name if it is not allowed here
+    size, owner, added : of its files [bytes], who posted it first, when [ns since 1970]
     parameters : names of its parameters
     """
 
@@ -44,19 +38,18 @@ class Entry:
     name: str
     summary: str
     branch: str
+    size: int
+    owner: str
+    added: int
     parameters: list[str]
 
 
-class Kept(NamedTuple):
-    """The files of a scene: id, who posted it first, size [bytes], time [ns since 1970]."""
-
-    id: str
-    owner: str
-    size: int
-    added: int
+_COLUMNS = ", ".join(Entry._fields)
+_TABLE = f"CREATE TABLE IF NOT EXISTS shelf ({_COLUMNS}, state, PRIMARY KEY (id))"
+"""A scene that this version does not allow has no name: its size counts, and no list has it."""
 
 
-def keep(blobs: Blobs, scene_id: str, description: Any, owner: str) -> None:
+def keep(blobs: Folder, scene_id: str, description: Any, owner: str) -> None:
     """Store a scene of this content id."""
     seal, written = f"scene {scene_id}", {}
     for name, mesh in (description.meshes or {}).items():
@@ -70,7 +63,7 @@ def keep(blobs: Blobs, scene_id: str, description: Any, owner: str) -> None:
             part.write_bytes(data)
 
 
-def stored(blobs: Blobs, scene_id: str, whole: bool) -> Scene | None:
+def stored(blobs: Folder, scene_id: str, whole: bool) -> Scene | None:
     """Return the scene of this id, None if it is not stored.
 
     One that is not ``whole`` has parameters, but no meshes: no model can be built of it.
@@ -132,7 +125,7 @@ def _mesh(path: Path, name: str) -> Any:
 class Index(Database):
     """The index of the scenes of a directory; its file may be in another one."""
 
-    def __init__(self, blobs: Blobs, lists: Path) -> None:
+    def __init__(self, blobs: Folder, lists: Path) -> None:
         super().__init__(lists / "scenes.sqlite", CatalogueDamaged, StoreBusy)
         self.blobs = blobs
 
@@ -183,22 +176,15 @@ class Index(Database):
 
     def page(self, limit: int, offset: int = 0, name: str | None = None) -> list[Entry]:
         """Return a page of the scenes, or of those of a name, the latest first."""
-        with self._reading() as connection:
-            rows = connection.execute(
-                "SELECT id, name, summary, branch, parameters FROM shelf WHERE name IS NOT NULL "
-                "AND ? IN (name, '') ORDER BY added DESC, id LIMIT ? OFFSET ?",
-                [name or "", limit, offset],
-            )
-            return [Entry(*[*row[:-1], json.loads(row[-1])]) for row in rows]
+        latest = "WHERE name IS NOT NULL AND ? IN (name, '') ORDER BY added DESC, id"
+        return self._entries(f"{latest} LIMIT ? OFFSET ?", name or "", limit, offset)
 
-    def files(self) -> list[Kept]:
-        """Return the files of all scenes, the oldest first."""
-        with self._reading() as connection:
-            rows = connection.execute("SELECT id, owner, size, added FROM shelf ORDER BY added, id")
-            return [Kept(*row) for row in rows]
+    def files(self) -> list[Entry]:
+        """Return all scenes, the oldest first, also those that are not allowed here."""
+        return self._entries("ORDER BY added, id")
 
-    @contextmanager
-    def _reading(self) -> Iterator[sqlite3.Connection]:
+    def _entries(self, rest: str, *values: Any) -> list[Entry]:
         with self.connection("BEGIN", "rw" if self.path.exists() else "memory") as connection:
             connection.execute(_TABLE)
-            yield connection
+            rows = connection.execute(f"SELECT {_COLUMNS} FROM shelf {rest}", values)
+            return [Entry._make((*row[:-1], json.loads(row[-1]))) for row in rows]

@@ -156,7 +156,7 @@ class Store:
             raise StudyError("scene", name, allowed)
         return found[0].id if found else name
 
-    def scene_files(self) -> list[shelf.Kept]:
+    def scene_files(self) -> list[shelf.Entry]:
         """Return the files of all scenes, the oldest first, also of those not allowed here."""
         return self._indexed(shelf.Index.files)
 
