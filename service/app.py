@@ -21,7 +21,6 @@ from service.access import Gate
 from service.connections import limited
 from service.datasets import Datasets
 from service.errors import QueueLost
-from service.examiner import Examiner
 from service.inspector import Inspector
 from service.jobs import Jobs
 from service.keys import Keys, KeysError
@@ -128,7 +127,7 @@ def assembled(settings: Settings, store: Store, jobs: Jobs, held: int | None) ->
     parts = {
         "settings": settings, "store": store, "jobs": jobs, "runner": runner, "keeper": keeper,
         "keys": keys, "metrics": metrics, "datasets": datasets, "probe": Probe(),
-        "examiner": Examiner(settings), "inspector": Inspector(settings.reader_seconds),
+        "inspector": Inspector(settings.reader_seconds),
         "details": Details(jobs, store), "tables": Tables(jobs, store),
         "pictures": Pictures(settings.map_bytes),
         "reading": Turns(READING, budget), "computing": Turns(COMPUTING, budget),

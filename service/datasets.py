@@ -81,7 +81,6 @@ class Datasets:
 
     Parameters
     ----------
-    jobs, store : the queue and the store
     computes : whether somebody takes studies from the queue
     """
 

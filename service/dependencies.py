@@ -11,7 +11,6 @@ from fastapi import Depends, Request
 
 from service.datasets import Datasets
 from service.errors import NotFound
-from service.examiner import Examiner
 from service.inspector import Inspector
 from service.job import Job
 from service.jobs import Jobs
@@ -45,7 +44,6 @@ def held(name: str) -> Any:
 
 TheDatasets = Annotated[Datasets, held("datasets")]
 TheDetails = Annotated[Details, held("details")]
-TheExaminer = Annotated[Examiner, held("examiner")]
 TheInspector = Annotated[Inspector, held("inspector")]
 TheJobs = Annotated[Jobs, held("jobs")]
 TheKeeper = Annotated[Keeper, held("keeper")]

@@ -24,13 +24,7 @@ from studies.views.reading import open_netcdf
 
 
 def draw_map(path: Path, query: MapQuery) -> bytes:
-    """Return a map of the run in ``path`` as PNG.
-
-    Raises
-    ------
-    StudyError
-        If the run has no such field, or the field no such component or stage.
-    """
+    """Return a map of the run in ``path`` as PNG."""
     verify(path)
     with open_netcdf(path) as run:
         return png(map_figure(run, **query.model_dump(exclude={"resolution"})), query.resolution)

@@ -52,7 +52,6 @@ class Busy(RuntimeError):
 
     Parameters
     ----------
-    reason : why
     seconds : time after which a repeated request may succeed [s]
     """
 

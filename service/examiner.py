@@ -43,32 +43,21 @@ class Examined:
         return self.estimate.costs(self.study.kind.chooses)
 
 
-class Examiner:
-    """Checks studies.
+async def examine(content: Mapping[str, Any], settings: Settings, share: Share) -> Examined:
+    """Return the study that ``content`` describes.
 
-    Parameters
-    ----------
-    settings : with the bounds on the cost of a study
+    Raises
+    ------
+    StudyError
+        If it has a mistake, or its cost exceeds the settings.
+    Busy
+        If the process was killed.
     """
-
-    def __init__(self, settings: Settings) -> None:
-        self.directory, self.bounds = settings.data, settings.bounds
-
-    async def examine(self, content: Mapping[str, Any], share: Share) -> Examined:
-        """Return the study that ``content`` describes.
-
-        Raises
-        ------
-        StudyError
-            If it has a mistake, or its cost exceeds the settings.
-        Busy
-            If the process was killed.
-        """
-        what = dict(content), self.directory, self.bounds
-        name, advice = content.get("name"), ": sweep less"
-        return await share.apart(
-            examined, *what, field="study", name=name, seconds=SECONDS, advice=advice
-        )
+    what = dict(content), settings.data, settings.bounds
+    return await share.apart(
+        examined, *what, field="study", name=content.get("name"), seconds=SECONDS,
+        advice=": sweep less",
+    )  # fmt: skip
 
 
 def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:

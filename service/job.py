@@ -94,7 +94,6 @@ def wanted(
 
     Parameters
     ----------
-    state, scene, name : state, scene and name of the job
     tag : one of the tags of its study
     text : a part of its name or note, in capitals or not
     """

@@ -40,25 +40,7 @@ FORM = 5
 """Form of the tables; a queue of another form is set aside, and made again from the studies."""
 
 TABLES = (
-    """CREATE TABLE job (
-    id TEXT PRIMARY KEY,
-    name TEXT NOT NULL,
-    scene TEXT NOT NULL,
-    size INTEGER NOT NULL,
-    state TEXT NOT NULL,
-    message TEXT NOT NULL,
-    progress REAL NOT NULL,
-    since INTEGER NOT NULL,
-    stood TEXT NOT NULL,
-    priority INTEGER NOT NULL,
-    submitted TEXT NOT NULL,
-    started TEXT,
-    finished TEXT,
-    turn INTEGER NOT NULL,
-    bytes REAL NOT NULL,
-    stage TEXT NOT NULL,
-    study TEXT NOT NULL
-)""",
+    f"CREATE TABLE job ({ALL}, study, PRIMARY KEY (id))",
     "CREATE INDEX job_by_turn ON job (turn)",
     "CREATE INDEX job_by_state ON job (state, priority, turn)",
     """CREATE TABLE run (

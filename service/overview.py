@@ -155,14 +155,9 @@ def searched_at(study: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict
 def log_of(job: Job, jobs: Jobs, store: Store) -> str:
     """Return a line for each thing that happened to a study, in the order of time.
 
-    Runs that were there before it was accepted come first. Of a study that an earlier version
-    accepted only the times of its row are known.
+    Runs that were there before it was accepted come first.
     """
     lines = jobs.told(job.id)
-    if not lines:
-        begun = [(job.submitted, "accepted"), (job.started, "running")]
-        ended = [(job.finished, f"{job.state}: {job.message}".removesuffix(": "))]
-        lines = [(at, words) for at, words in begun + ended if at]
     for run_id, row in store.catalogue.each(jobs.runs(job.id)):
         if row:
             seconds = (

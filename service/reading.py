@@ -45,11 +45,6 @@ def values(
     """Return a map or lines of the first run, less the map of the second if there is one.
 
     They are octets, or a ``table`` as CSV.
-
-    Raises
-    ------
-    StudyError
-        if the run has no such field, component or stage
     """
     with ExitStack() as stack:
         runs = [stack.enter_context(opened(path)) for path in files]

@@ -92,12 +92,7 @@ def add(study_id: str, jobs: Jobs, store: Store, begun: bool = True) -> None:
 
 
 class Mender:
-    """Looks after queue, catalogue and studies: what is lost or damaged is made again, unasked.
-
-    Parameters
-    ----------
-    jobs, store : the queue and the store
-    """
+    """Looks after queue, catalogue and studies: what is lost or damaged is made again, unasked."""
 
     def __init__(self, jobs: Jobs, store: Store) -> None:
         self.jobs, self.store = jobs, store

@@ -52,13 +52,7 @@ ELSEWHERE = "it has not ended, and no run was added lately"
 
 
 class ViewedFolder:
-    """A folder of results, as a store and a queue in which nothing waits.
-
-    Parameters
-    ----------
-    directory : the folder
-    aside : folder for catalogue and queue
-    """
+    """A folder of results, as a store and a queue in which nothing waits; these lists are aside."""
 
     def __init__(self, directory: Path, aside: Path) -> None:
         self.store = Store(directory.resolve(), held=True, aside=aside)
@@ -180,12 +174,6 @@ def _tell_others(path: Path, shown: ViewedFolder) -> None:
 
 def view(path: Path, port: int = 0, browser: bool = True) -> None:
     """Show pages on a folder or a data set until Ctrl-C, to this machine alone.
-
-    Parameters
-    ----------
-    path : as for `application`
-    port : where to listen; 0 for any free port
-    browser : whether to open them in the browser
 
     Raises
     ------

@@ -23,13 +23,7 @@ CHARTS = "plotly.js"
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """A static file.
-
-    Attributes
-    ----------
-    media_type : its type
-    packed : its content, packed by gzip
-    """
+    """A static file."""
 
     media_type: str
     packed: bytes

@@ -13,15 +13,15 @@ from fastapi.responses import JSONResponse, RedirectResponse
 
 from service.dependencies import (
     TheComputing,
-    TheExaminer,
     TheInspector,
     TheKeeper,
     TheReading,
+    TheSettings,
     TheStore,
     in_turn,
 )
 from service.errors import NoRoom
-from service.examiner import Examined
+from service.examiner import Examined, examine
 from service.maps import PNG
 from service.pages import form
 from service.pages.rendering import ROOT, PageRoute, page, to_study
@@ -113,7 +113,7 @@ async def take_scene(
 async def make(
     request: Request,
     store: TheStore,
-    examiner: TheExaminer,
+    settings: TheSettings,
     keeper: TheKeeper,
     reading: TheReading,
     computing: TheComputing,
@@ -126,7 +126,7 @@ async def make(
     found: Examined | None = None
     if not wrong:
         try:
-            examined = await examiner.examine(content, computing)
+            examined = await examine(content, settings, computing)
             await run_in_threadpool(keeper.check_room, examined)
             found = examined
         except StudyError as error:

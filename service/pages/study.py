@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from studies.definition.vocabulary import OK
-from studies.views.figures import FIGURES, Floors, group_of
+from studies.views.figures import FIGURES, Floors, group_of, varies
 from studies.views.html import number
 from studies.views.table import MESSAGE, NUMBERS, RUN, STATUS, Column, RunTable, varied
 
@@ -50,12 +50,6 @@ def usual(table: RunTable) -> list[Column]:
         (each for each in table.numbers if not np.isnan(each.values).all()),
         key=lambda each: rank(each.name),
     )
-
-
-def varies(column: Column) -> bool:
-    """Whether the numbers of a column are not all the same."""
-    known = column.values[~np.isnan(column.values)]
-    return bool(known.size) and bool((known != known[0]).any())
 
 
 def rank(name: str) -> tuple[int, int]:
@@ -102,7 +96,7 @@ def part(table: RunTable, query: Mapping[str, str]) -> TablePart:
     pages = max(1, -(-len(found) // ROWS))
     number = query.get("page", "1")
     page = min(max(int(number[:9]), 1), pages) if number.isdecimal() else 1
-    differ = [each.name for each in usual(table) if varies(each)]
+    differ = [each.name for each in usual(table) if varies(each.values)]
     named = differ[:SHOWN]
     extra = [sort.removeprefix("-"), query.get("number", ""), *where]
     fresh = [n for n in dict.fromkeys(extra) if n in table.columns and n not in (RUN, MESSAGE)]
@@ -154,7 +148,7 @@ def described(table: RunTable) -> dict[str, Any]:
             {
                 **_said(each),
                 "group": each.group,
-                "varies": varies(each),
+                "varies": varies(each.values),
                 "flags": {str(code): word for code, word in each.flags.items()},
             }
             for each in usual(table)

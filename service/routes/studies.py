@@ -22,7 +22,6 @@ from service.dependencies import (
     TheDatasets,
     TheDetails,
     TheDrawing,
-    TheExaminer,
     TheJob,
     TheJobs,
     TheKeeper,
@@ -33,6 +32,7 @@ from service.dependencies import (
     in_turn,
 )
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
+from service.examiner import examine
 from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
 from service.maps import PICTURE
 from service.middleware import StrictRoute
@@ -117,14 +117,14 @@ def taken_priority(content: dict[str, Any]) -> int:
 async def submit(
     content: Content,
     keeper: TheKeeper,
-    examiner: TheExaminer,
+    settings: TheSettings,
     computing: TheComputing,
     request: Request,
     response: Response,
 ) -> StudySummary:
     """Accept a study; 200 when it is known already, whatever became of it."""
     priority = taken_priority(content)
-    found = await examiner.examine(content, computing)
+    found = await examine(content, settings, computing)
     job, new = await asyncio.to_thread(keeper.accept, found, priority)
     if not new:
         response.status_code = HTTPStatus.OK
@@ -326,7 +326,7 @@ async def tile(
 @costs.post("/estimate", responses=REFUSED)
 async def estimate(
     content: Content,
-    examiner: TheExaminer,
+    settings: TheSettings,
     computing: TheComputing,
     keeper: TheKeeper,
 ) -> Estimate:
@@ -336,6 +336,6 @@ async def estimate(
     refused as it is when it is submitted.
     """
     taken_priority(content)
-    found = await examiner.examine(content, computing)
+    found = await examine(content, settings, computing)
     await asyncio.to_thread(keeper.check_room, found)
     return found.estimate
