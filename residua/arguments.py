@@ -46,7 +46,7 @@ def parser() -> argparse.ArgumentParser:
     _of_study(add, "show", commands.show, _store, "DIR|RUN")
 
     one = _of_study(add, "export", commands.export, _store, "RUN|DIR")
-    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    _several(one, "--select", "NAME=VALUE")
     one.add_argument(
         "--vtu", type=_path, metavar="FOLDER", help="fields at the nodes, for ParaView"
     )
@@ -115,18 +115,13 @@ def _add_pictures(add: Add) -> None:
         "what", metavar="SCENE|STUDY.toml",
         help="name of a scene, its file, or a study, whose first run is drawn",
     )  # fmt: skip
-    one.add_argument(
-        "--set", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
-        help="parameters, in place of those of the study or the defaults",
-    )  # fmt: skip
+    _several(one, "--set", "NAME=VALUE", "in place of those of the study or the defaults")
     one.add_argument("--zoom", type=float, metavar="MM", help="only within this distance of 0, 0")
     _add_window(one)
 
     one = _of_study(add, "plot", commands.plot, _place, "RUN|DIR")
-    one.add_argument(
-        "--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE",
-        help="of the sweep, or of the field's own dimensions, such as pass=2",
-    )  # fmt: skip
+    own = "of the sweep, or of the field's own dimensions, such as pass=2"
+    _several(one, "--select", "NAME=VALUE", own)
     one.add_argument("--field", help="default: residual_stress, or map_stress if not released")
     one.add_argument("--component")
     one.add_argument(
@@ -208,14 +203,14 @@ def _add_cluster(add: Add) -> None:
     one.add_argument("--script", type=_path, required=True, metavar="FILE", help="what is written")
 
 
+_WHERE = 'such as "friction<0.3" or "hardening=none"; runs must meet all'
+
+
 def _add_numbers(add: Add) -> None:
     one = add("diff", commands.diff)
     one.add_argument("first", type=_place, metavar="A", help="a study: a folder, a file or a URL")
     one.add_argument("second", type=_place, metavar="B", help="a study that may differ from it")
-    one.add_argument(
-        "--ignore", nargs="+", action="extend", default=[], metavar="NAME",
-        help="parameters that do not count, such as those of the mesh",
-    )  # fmt: skip
+    _several(one, "--ignore", "NAME", "parameters that do not count, such as those of the mesh")
     one.add_argument("--field", help="the number of the runs that is drawn")
     one.add_argument("--out", type=_path, metavar="PNG", help="draw what differs")
 
@@ -224,30 +219,27 @@ def _add_numbers(add: Add) -> None:
     kind.add_argument("--csv", action="store_true", help="with commas between; this is the default")
     kind.add_argument("--json", action="store_true", help="columns with units, rows as objects")
     one.add_argument("--columns", nargs="+", metavar="NAME", help="default: all")
-    _add_where(one)
+    _several(one, "--where", "CONDITION", _WHERE)
     one.add_argument(
         "--sort", default="", metavar="NAME", help="by a column; --sort=-NAME: largest first"
     )
     one.add_argument("--out", type=_path, metavar="FILE", help="default: print it")
 
-    one = _of_study(add, "best", commands.best, _place, "DIR")
-    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    _add_where(one)
+    one = _add_number(add, "best", commands.best, _place)
+    _several(one, "--where", "CONDITION", _WHERE)
     one.add_argument("--lowest", action="store_true", help="the lowest numbers first")
     one.add_argument("--count", type=_integer(1, 10**6), default=10, help="default: %(default)s")
 
-    one = _of_study(add, "predict", commands.predict, _store, "DIR")
+    one = _add_number(add, "predict", commands.predict, _store)
     one.add_argument("at", nargs="+", metavar="NAME=VALUE", help="each parameter that varies")
-    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
     one.add_argument("--by", choices=["cells", "gaussian"], help="default: cells, if it has any")
     one.add_argument("--within", type=float, metavar="E", help="largest error that is enough")
     one.add_argument(
         "--compute", action="store_true", help="compute the run there if the error is larger"
     )
 
-    one = _of_study(add, "sensitivity", commands.sensitivity, _store, "DIR")
-    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
-    one.add_argument("--select", nargs="+", action="extend", default=[], metavar="NAME=VALUE")
+    one = _add_number(add, "sensitivity", commands.sensitivity, _store)
+    _several(one, "--select", "NAME=VALUE")
     one.add_argument(
         "--method", default="chaos",
         help="chaos (default); delta, pawn or rbd_fast, with the library SALib",
@@ -255,11 +247,17 @@ def _add_numbers(add: Add) -> None:
     one.add_argument("--out", type=_path, metavar="PNG", help="draw indices, tornado and runs")
 
 
-def _add_where(one: argparse.ArgumentParser) -> None:
-    one.add_argument(
-        "--where", nargs="+", action="extend", default=[], metavar="CONDITION",
-        help='such as "friction<0.3" or "hardening=none"; runs must meet all',
-    )  # fmt: skip
+def _several(
+    one: argparse.ArgumentParser, option: str, metavar: str, words: str | None = None
+) -> None:
+    one.add_argument(option, nargs="+", action="extend", default=[], metavar=metavar, help=words)
+
+
+def _add_number(add: Add, name: str, command: Any, kind: Callable[[str], Any]) -> Any:
+    """Return the parser of a command on a number of the runs of a study."""
+    one = _of_study(add, name, command, kind, "DIR")
+    one.add_argument("--of", required=True, metavar="NAME", help="a number of the runs")
+    return one
 
 
 def _add_access(add: Add) -> None:

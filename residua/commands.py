@@ -355,12 +355,10 @@ def _written_nodes(run: Any, folder: Path) -> Path:
     from studies.views.solution import read
 
     try:
-        return write_vtu(read(run), folder)
+        with _writable("--vtu", folder):
+            return write_vtu(read(run), folder)
     except ModelError as error:
         raise StudyError("--vtu", str(folder), error.allowed) from None
-    except OSError as error:
-        allowed = f"cannot be written: {error.strerror}"
-        raise StudyError("--vtu", str(folder), allowed) from None
 
 
 def serve(options: argparse.Namespace) -> int:
@@ -477,9 +475,15 @@ def _written(option: str, path: Path) -> Iterator[Path]:
     from solver.files import appearing
     from studies.storage.room import needs_room
 
+    with _writable(option, path), needs_room(path.parent), appearing(path) as part:
+        yield part
+
+
+@contextmanager
+def _writable(option: str, path: Path) -> Iterator[None]:
+    """Name the option if what it names cannot be written."""
     try:
-        with needs_room(path.parent), appearing(path) as part:
-            yield part
+        yield
     except OSError as error:
         raise StudyError(option, str(path), f"cannot be written: {error.strerror}") from None
 

@@ -29,13 +29,7 @@ _QUIET = 10.0
 
 
 class Progress:
-    """A bar on one line of a terminal; otherwise a plain line for each run, or each 10 s.
-
-    Parameters
-    ----------
-    study : the study, for the position of each run in the sweep
-    stream : where to write; standard error by default
-    """
+    """A bar on one line of a terminal; otherwise a plain line for each run, or each 10 s."""
 
     def __init__(self, study: Study, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr

@@ -82,10 +82,6 @@ class Client:
     def submit(self, study: Study | Mapping[str, Any] | Path | str) -> RemoteStudy:
         """Send a study, and before it the scene file it names; return it as the service has it.
 
-        Parameters
-        ----------
-        study : a study, its content, or the path of a study file
-
         Raises
         ------
         Refused
@@ -161,12 +157,9 @@ class Client:
         NoAnswer
             if none answers
         """
-        until = time.monotonic() + _WAIT
-        while True:
-            with self._answering():
-                answer = self._client.request(method, path, **content)
-            if method != "GET" or not _later(answer, until):
-                return _accepted(answer)
+        with self.read(path, method, **content) as answer:
+            answer.read()
+            return answer
 
     def told(self, method: str, path: str, **content: Any) -> Any:
         """Return what the answer to a request tells; errors as `ask`."""
@@ -177,12 +170,12 @@ class Client:
             raise Refused(f"{answer.url} does not answer as a service of studies does") from None
 
     @contextlib.contextmanager
-    def read(self, path: str) -> Iterator[httpx.Response]:
+    def read(self, path: str, method: str = "GET", **content: Any) -> Iterator[httpx.Response]:
         """Give an answer that is read piece by piece; errors as `ask`."""
         until = time.monotonic() + _WAIT
         while True:
-            with self._answering(), self._client.stream("GET", path) as answer:
-                if not _later(answer, until):
+            with self._answering(), self._client.stream(method, path, **content) as answer:
+                if method != "GET" or not _later(answer, until):
                     yield _accepted(answer)
                     return
 
@@ -196,12 +189,7 @@ class Client:
 
 
 class RemoteStudy:
-    """A study of a service; a notebook shows it as HTML.
-
-    Attributes
-    ----------
-    client, id : the service, and the id of the study
-    """
+    """A study of a service; a notebook shows it as HTML."""
 
     def __init__(self, client: Client, study_id: str) -> None:
         self.client, self.id = client, study_id

@@ -180,12 +180,7 @@ class StoreBusy(RuntimeError):
 
 
 class StoreFull(RuntimeError):
-    """The disk is full: with free space, running again computes the rest.
-
-    Parameters
-    ----------
-    directory : where results were to be written
-    """
+    """The disk is full: with free space, running again computes the rest."""
 
     def __init__(self, directory: str) -> None:
         super().__init__(directory)
@@ -217,13 +212,7 @@ class FileDamaged(RuntimeError):
 
 
 class FileDiffers(RuntimeError):
-    """The file of a run would differ from the computed and audited results.
-
-    Parameters
-    ----------
-    run_id : of the run
-    differences : what is wrong with the file, in words
-    """
+    """The file of a run would differ from the computed and audited results."""
 
     def __init__(self, run_id: str, differences: Sequence[str]) -> None:
         super().__init__(run_id, differences)

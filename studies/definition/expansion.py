@@ -61,7 +61,6 @@ class Expansion:
     ----------
     source : the sources of the scene, see `written`; read once
     size : number of runs
-    path_count : number of loading paths
     """
 
     def __init__(self, scene: Scene, fixed: Mapping[str, Any], axes: Axes) -> None:
@@ -77,7 +76,6 @@ class Expansion:
         self._sets = [self._axis(positions(name, axis)) for name, axis in axes.items()]
         self._together = [axis.together(scene.branch) for axis in self._sets]
         self.size = math.prod(len(axis.settings) for axis in self._sets)
-        self.path_count = math.prod(map(len, self._together))
 
     def check(self) -> None:
         """Build the parameter object of every run: it checks itself.

@@ -39,10 +39,6 @@ _ROUNDING = 1.0 + 1e-9
 class Neighbours:
     """The places of the axes of a study.
 
-    Parameters
-    ----------
-    sets : the parameters that each place sets
-
     Attributes
     ----------
     before : of each place the numbers of those it waits for; none of the first ones

@@ -426,13 +426,7 @@ class Study(StudyTable):
         return self.kind.usual_runs(self.expansion.size)
 
     def stage(self, ended: int = 0, told: str = "") -> str:
-        """Return how far a study that chooses its runs is, as text; empty for others.
-
-        Parameters
-        ----------
-        ended : number of its programs that have ended
-        told : what its program tells, if it has one
-        """
+        """Return how far a study that chooses its runs is, as text; empty for others."""
         return self.kind.stage(self.expansion.size, ended, told)
 
     def run_ids(self) -> Iterator[str]:

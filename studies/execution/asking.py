@@ -45,12 +45,6 @@ class Asked(NamedTuple):
 class Asking:
     """The programs of a study, and the runs that they ask for.
 
-    Parameters
-    ----------
-    study : a study that chooses its runs
-    store : the runs that are there are not computed again
-    resume, since : as in `run_study`: which failed runs are taken as they are
-
     Attributes
     ----------
     places : the programs with their runs, in the order of `Kind.programs`

@@ -291,7 +291,10 @@ def memory_needed(study: Study) -> int:
     scene, most, kept = study.problem, 0, most_kept()
     if scene.effort is None:
         return most
-    for path, values in itertools.islice(_asked(study), _BATCH):
+    branch = scene.branch
+    paths = ((path, [case.values.get(branch) for case in path.cases]) for path in study.paths())
+    every = _longest(study) if study.kind.chooses else paths
+    for path, values in itertools.islice(every, _BATCH):
         with contextlib.suppress(ModelError):  # its runs will end at once
             most = max(most, _of_a_worker(scene.effort(path.parameters, values), kept))
     return most
@@ -330,15 +333,6 @@ def _missing(study: Study, store: Store) -> Iterator[tuple[LoadingPath, list[Any
         for path in batch:
             if missing := [case.values.get(branch) for case in path.cases if case.id not in done]:
                 yield path, missing, _begun(path, missing, store) if any_stored else []
-
-
-def _asked(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:
-    """Yield the loading paths of a study, and the values of its branch parameter on each."""
-    if study.kind.chooses:
-        yield from _longest(study)
-        return
-    for path in study.paths():
-        yield path, [case.values.get(study.problem.branch) for case in path.cases]
 
 
 def _longest(study: Study) -> Iterator[tuple[LoadingPath, list[Any]]]:

@@ -74,13 +74,7 @@ _NAME = "residua-fork"
 
 @dataclass(slots=True, eq=False)
 class Fork:
-    """A process that calls a function.
-
-    Attributes
-    ----------
-    pid : its id
-    end : tells its exit status when it has ended
-    """
+    """A process that calls a function."""
 
     pid: int
     end: Connection
@@ -104,12 +98,7 @@ class Fork:
 
 
 class Forks:
-    """A process whose forks call functions; it is started when it is needed, and again if it ended.
-
-    Parameters
-    ----------
-    modules : what it loads
-    """
+    """A process whose forks call functions; it is started when needed, and again if it ended."""
 
     def __init__(self, modules: Sequence[str] = NEEDED) -> None:
         self.modules = modules

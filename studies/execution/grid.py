@@ -58,13 +58,7 @@ _WORKER_DIED = (
 
 
 class Grid:
-    """The workers of a scheduler.
-
-    Parameters
-    ----------
-    access : to the scheduler
-    patience : see `connect`
-    """
+    """The workers of a scheduler."""
 
     def __init__(self, access: Access, patience: float | None = None) -> None:
         self._client = connect(access, patience)

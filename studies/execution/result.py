@@ -19,8 +19,8 @@ from studies.storage import ran, runfile, seal
 from studies.storage.dataset import RunContent
 from studies.storage.estimated import WITHOUT, described, numbers_in, with_errors, without
 from studies.storage.made import Combined, Made, held
-from studies.storage.origin import origin
 from studies.storage.provenance import provenance
+from studies.storage.ran import origin
 from studies.storage.store import Store
 
 _NAME = "data set"
@@ -63,13 +63,7 @@ def result(
 
 
 def answered(study: Study, store: Store, asking: Asking, anew: bool) -> Combined:
-    """Write what a study has found that chooses its runs, unless there is a data set of the same.
-
-    Parameters
-    ----------
-    study, store, asking : the study, its store, and what it has asked for
-    anew : whether runs were computed
-    """
+    """Write what a study found that chooses its runs, unless there is a data set of the same."""
     found: Answers = study.kind.answers(study, [place.program for place in asking.places])
     entry = {study.kind.name: canonical(study.kind.content)}
     if found.points is not None:

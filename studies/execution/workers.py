@@ -246,13 +246,7 @@ def connect(access: Access, patience: float | None = None) -> Client:
 
 
 def called(calls: Sequence[Callable[[], Any]], workers: int) -> list[Any]:
-    """Call functions in separate processes, and return their results in order.
-
-    Raises
-    ------
-    StudyError
-        if the running script would start processes in each process again
-    """
+    """Call functions in separate processes, and return their results in order."""
     check_script()
     later = [delayed(call)() for call in calls]
     return list(compute(*later, scheduler="processes", num_workers=workers))

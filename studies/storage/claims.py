@@ -58,16 +58,10 @@ class Claim:
 
 
 class Claims:
-    """The claims in a directory: marks ``<name>.<number>`` of which one process can make each.
+    """The claims in a directory: marks ``<name>.<number>`` of which one process can make each."""
 
-    Parameters
-    ----------
-    directory : the directory; made if it is missing
-    stale : age of a claim of another machine at which it is dead [s]
-    """
-
-    def __init__(self, directory: Path, stale: float = STALE) -> None:
-        self._directory, self._stale = directory, stale
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
         directory.mkdir(parents=True, exist_ok=True)
 
     @contextmanager
@@ -131,7 +125,7 @@ class Claims:
                     return _free(file.fileno())
                 os.utime(own[0])  # the time of the file system alone is that of all machines
                 age = os.fstat(own[1]).st_mtime - os.fstat(file.fileno()).st_mtime
-                return abs(age) > self._stale  # an owner sets no time in the future
+                return abs(age) > STALE  # an owner sets no time in the future
         except FileNotFoundError:
             return False
         except (NoFile, ValueError, LookupError, TypeError):  # no claim of ours

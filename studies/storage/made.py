@@ -29,12 +29,7 @@ _LIBRARIES = ("h5netcdf", "matplotlib", "xarray")
 
 
 class Made:
-    """The results in the directory of a study.
-
-    Parameters
-    ----------
-    study, store : the study, and the store of its results
-    """
+    """The results in the directory of a study."""
 
     def __init__(self, study: Study, store: Store) -> None:
         self._study, self._store = study, store

@@ -30,10 +30,6 @@ class Reservoir(io.FileIO):
 
     HDF5 does not survive a failed write: closing the file afterwards ends the process. Therefore
     every write succeeds here, and `check` reports in between whether the disk was full.
-
-    Parameters
-    ----------
-    path : path of the file
     """
 
     def __init__(self, path: Path) -> None:

@@ -17,8 +17,8 @@ from studies.errors import StudyError
 from studies.numbers import number_text
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of
-from studies.views.columns import unit_text, value_text
-from studies.views.figures import FIGURES, group_of, meter, worst
+from studies.views.columns import meaning_of, unit_of, unit_text, value_text, with_unit
+from studies.views.figures import FIGURES, group_of, meter, varies, worst
 from studies.views.html import templates
 from studies.views.picking import one_run, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
@@ -124,7 +124,7 @@ def _axis(dataset: xr.Dataset, name: str) -> dict[str, str]:
     return {
         "name": name,
         "words": str(values.attrs.get("long_name", "")),
-        "unit": _unit(values.attrs),
+        "unit": unit_of(values),
         "text": values_text(values.to_numpy().tolist(), most=SPELT),
     }
 
@@ -160,12 +160,12 @@ def _exact(value: Any) -> str:
 
 def _figures(dataset: xr.Dataset, axes: list[str]) -> Iterator[dict[str, Any]]:
     """Yield pictures: the main numbers over the sweep, a map and lines of one run."""
-    singles = [name for name in sweep_fields(dataset) if _is_main(name)]
+    singles = [name for name in sweep_fields(dataset) if name != "status" and _is_main(name)]
     singles.sort(key=lambda name: name not in FIGURES)
-    numbers = [name for name in singles if _varies(dataset[name])] if axes else []
+    numbers = [name for name in singles if varies(dataset[name].to_numpy())] if axes else []
     for name in numbers[:DRAWN]:
         try:
-            yield _figure(sweep_figure(dataset, name), _words(dataset[name]))
+            yield _figure(sweep_figure(dataset, name), _said(dataset[name]))
         except StudyError:  # such as a number that no run has
             continue
     try:
@@ -177,11 +177,11 @@ def _figures(dataset: xr.Dataset, axes: list[str]) -> Iterator[dict[str, Any]]:
     field = usual_field(run)
     if field in map_fields(run):
         component = "xx" if "component" in run[field].dims else None
-        text = f"{_words(run[field])}{f', {component},' if component else ''}{where}"
+        text = f"{_said(run[field])}{f', {component},' if component else ''}{where}"
         yield _figure(map_figure(run, field, component), text, whole=True)
     for name in LINES:
         if name in line_fields(run) and run[name].notnull().any():
-            yield _figure(line_figure(run, name), f"{_words(run[name])}{where}")
+            yield _figure(line_figure(run, name), f"{_said(run[name])}{where}")
 
 
 def _figure(drawn: Any, words: str, whole: bool = False) -> dict[str, Any]:
@@ -192,11 +192,6 @@ def _figure(drawn: Any, words: str, whole: bool = False) -> dict[str, Any]:
 def _is_main(name: str) -> bool:
     """Whether a number tells of the result: not of the effort, the audit, or a position."""
     return group_of(name) == "result" and not re.search(r"^depth_of_|_[xyzs]$", name)
-
-
-def _varies(values: xr.DataArray) -> bool:
-    known = values.to_numpy()[values.notnull().to_numpy()]
-    return known.dtype.kind in "fiu" and known.size > 0 and bool((known != known[0]).any())
 
 
 def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
@@ -240,11 +235,5 @@ def _made(attrs: Mapping[Any, Any]) -> dict[str, str]:
     return {name: str(value) for name, value in found.items() if value}
 
 
-def _words(values: xr.DataArray) -> str:
-    unit = _unit(values.attrs)
-    words = str(values.attrs.get("long_name", str(values.name).replace("_", " ")))
-    return f"{words} [{unit}]" if unit else words
-
-
-def _unit(attrs: Mapping[Any, Any]) -> str:
-    return unit_text(attrs.get("units"))
+def _said(values: xr.DataArray) -> str:
+    return with_unit(meaning_of(values), unit_of(values))

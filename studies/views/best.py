@@ -10,7 +10,7 @@ import xarray as xr
 
 from studies.definition.vocabulary import OK
 from studies.errors import StudyError
-from studies.views.columns import in_blocks, stacked, unit_text, value_text
+from studies.views.columns import in_blocks, meaning_of, stacked, unit_of, value_text, with_unit
 from studies.views.figures import group_of
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
 from studies.views.plots.fields import sweep_fields, wide_fields
@@ -46,8 +46,8 @@ def column_over(values: xr.DataArray, flat: np.ndarray, group: str) -> Column:
     number = flat.dtype.kind in "fiu"
     return Column(
         name=str(values.name),
-        words=str(values.attrs.get("long_name", str(values.name).replace("_", " "))),
-        unit=unit_text(values.attrs.get("units")),
+        words=meaning_of(values),
+        unit=unit_of(values),
         group=group,
         flags=flags(values) if number else {},
         values=flat.astype(float) if number else flat.astype(str).astype(object),
@@ -107,13 +107,7 @@ def best_runs(
 def best_table(dataset: xr.Dataset, of: str, runs: Sequence[Mapping[str, Any]]) -> str:
     """Return a line for each run that `best_runs` has found."""
     meaning = flags(dataset[of])
-    units = (dataset[name].attrs.get("units", "") for name in runs[0])
-    lines = [
-        [meaning.get(value, "") or value_text(value) for value in run.values()]
-        if meaning
-        else [value_text(value) for value in run.values()]
-        for run in runs
-    ]
-    second = ["" if unit in {"", "1"} else f"[{unit}]" for unit in units]
+    lines = [[meaning.get(each, "") or value_text(each) for each in run.values()] for run in runs]
+    second = [with_unit("", unit_of(dataset[name])) for name in runs[0]]
     headings = [name.replace("_", " ") for name in runs[0]]
     return in_blocks([*stacked(headings), second, *lines], 1, right=len(headings) - 1)

@@ -51,6 +51,21 @@ def unit_text(unit: Any) -> str:
     return "" if unit in (None, "1") else str(unit)
 
 
+def unit_of(variable: Any) -> str:
+    """Return the unit of a variable as text."""
+    return unit_text(variable.attrs.get("units"))
+
+
+def meaning_of(variable: Any) -> str:
+    """Return what a variable is; by default its name in words."""
+    return str(variable.attrs.get("long_name", str(variable.name).replace("_", " ")))
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Return a text with a unit behind it, if there is one: ``pressure [MPa]``."""
+    return f"{text} [{unit}]".lstrip() if unit else text
+
+
 def counted(value: Any) -> str:
     """Return a list of points or tables, or the JSON of one, as their number; other text as is."""
     text = str(value)
@@ -107,7 +122,7 @@ def aligned(lines: Sequence[Sequence[str]], right: int | None = None) -> str:
     )
 
 
-def plain(name: str) -> str:
+def words(name: str) -> str:
     """Return a name in words; the place of a peak, such as ``peak_pressure_s``, is named first."""
     if place := _PLACE.fullmatch(name):
         name = f"{place['axis']} of {place['of']}"

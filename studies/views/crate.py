@@ -31,8 +31,8 @@ from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
 from studies.scenes.file_scene import FileScene
 from studies.storage import runfile, seal
-from studies.storage.origin import PROGRAM, files_of, meshes_of
 from studies.storage.provenance import NONE
+from studies.storage.ran import PROGRAM, files_of, meshes_of
 from studies.storage.store import Store
 from studies.views.columns import value_text
 from studies.views.differing import diff, difference_table
@@ -101,13 +101,7 @@ def export(path: Path, target: Path) -> None:
 
 
 class Compared(NamedTuple):
-    """The runs of a crate beside those that were computed again.
-
-    Attributes
-    ----------
-    text : what differs
-    same : whether the statuses and, of one version, the ids are the same
-    """
+    """What differs from the runs of a crate, as text, and whether they count as the same."""
 
     text: str
     same: bool
@@ -239,17 +233,15 @@ class _Writer:
     def _file(self, name: str, words: str, **more: Any) -> None:
         path = self.folder / name
         self.files.append(name)
-        self.entities.append(
-            {
-                "@id": quote(name),
-                "@type": "File",
-                "name": words,
-                "contentSize": str(path.stat().st_size),
-                "sha256": seal.digest(path),
-                "encodingFormat": _KINDS.get(path.suffix, "application/octet-stream"),
-                **more,
-            }
-        )
+        self._add(
+            quote(name), "File", name=words, contentSize=str(path.stat().st_size),
+            sha256=seal.digest(path),
+            encodingFormat=_KINDS.get(path.suffix, "application/octet-stream"), **more,
+        )  # fmt: skip
+
+    def _add(self, own: str, kind: str, **entries: Any) -> None:
+        """Describe what has an id."""
+        self.entities.append(_entity(own, kind, **entries))
 
     def _scene(self) -> list[str]:
         """Copy the scene from a file, and its meshes; return their names in the crate."""
@@ -314,15 +306,9 @@ class _Writer:
             self.entities.append(_formal(f"#{name}", name, kind, examples, "parameter that varies"))
             for text, own in ids.items():
                 value = json.loads(text)
-                self.entities.append(
-                    {
-                        "@id": own,
-                        "@type": "PropertyValue",
-                        "name": name,
-                        "value": value if isinstance(value, int | float | str) else text,
-                        "exampleOfWork": _to(f"#{name}"),
-                    }
-                )
+                plain = value if isinstance(value, int | float | str) else text
+                of = _to(f"#{name}")
+                self._add(own, "PropertyValue", name=name, value=plain, exampleOfWork=of)
         return found
 
     def _used(self, what: str, value: str) -> str:
@@ -330,9 +316,7 @@ class _Writer:
         own = f"#{what}-{seal.digest_of(value.encode())[:12]}"
         if own not in self.used:
             self.used.add(own)
-            self.entities.append(
-                {"@id": own, "@type": "PropertyValue", "name": what, "value": value}
-            )
+            self._add(own, "PropertyValue", name=what, value=value)
         return own
 
     def _whole(self, study: str, given: list[str], dataset: str, runs: list[Entity]) -> str:
@@ -340,20 +324,13 @@ class _Writer:
         began = [each["startTime"] for each in runs if "startTime" in each]
         ended = [each["endTime"] for each in runs]
         own = f"#study-{self.study.id}"
-        self.entities.append(
-            {
-                "@id": own,
-                "@type": "CreateAction",
-                "name": f"computation of the study {self.study.name}",
-                "description": f"{len(runs)} runs, and their data set",
-                "instrument": _to(quote(study)),
-                "object": [_to(quote(each)) for each in given],
-                "result": [_to(dataset)],
-                "actionStatus": _COMPLETED,
-                **({"startTime": min(began)} if began else {}),
-                **({"endTime": max(ended)} if ended else {}),
-            }
-        )
+        self._add(
+            own, "CreateAction", name=f"computation of the study {self.study.name}",
+            description=f"{len(runs)} runs, and their data set", instrument=_to(quote(study)),
+            object=[_to(quote(each)) for each in given], result=[_to(dataset)],
+            actionStatus=_COMPLETED, **({"startTime": min(began)} if began else {}),
+            **({"endTime": max(ended)} if ended else {}),
+        )  # fmt: skip
         return own
 
     def _workflow(self, name: str, attrs: Mapping[str, Any]) -> None:
@@ -368,52 +345,34 @@ class _Writer:
             "input": [_to(f"#{each}") for each in self.varied],
             "output": [_to("#run")],
         }
-        commit = {"identifier": attrs["commit"]} if "commit" in attrs else {}
-        self.entities += [
-            {
-                "@id": _LANGUAGE,
-                "@type": "ComputerLanguage",
-                "name": "study file of Residua (TOML)",
-                "url": _to("https://toml.io/en/v1.0.0"),
-            },
-            {
-                "@id": _PROGRAM,
-                "@type": "SoftwareApplication",
-                "name": "Residua",
-                "softwareVersion": str(attrs["source"]).removeprefix("Residua "),
-                "description": f"sources {attrs['solver_source']}; libraries {attrs['versions']}",
-                "softwareRequirements": f"SHA-256 of requirements.lock: {attrs['lock']}",
-                **commit,
-            },
-        ]
+        url = _to("https://toml.io/en/v1.0.0")
+        self._add(_LANGUAGE, "ComputerLanguage", name="study file of Residua (TOML)", url=url)
+        self._add(
+            _PROGRAM, "SoftwareApplication", name="Residua",
+            softwareVersion=str(attrs["source"]).removeprefix("Residua "),
+            description=f"sources {attrs['solver_source']}; libraries {attrs['versions']}",
+            softwareRequirements=f"SHA-256 of requirements.lock: {attrs['lock']}",
+            **({"identifier": attrs["commit"]} if "commit" in attrs else {}),
+        )  # fmt: skip
 
     def _root(self, main: str, attrs: Mapping[str, Any], actions: list[str]) -> None:
         """Describe the crate itself."""
         study = self.study
         licence, described = _license(study.licence)
-        root: Entity = {
-            "@id": "./",
-            "@type": "Dataset",
-            "name": study.name,
-            "description": study.note or f"{len(actions) - 1} runs of {study.problem.summary}",
-            "datePublished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-            "license": licence,
-            "citation": attrs["cite"] if attrs["cite"] != NONE else PROGRAM,
-            "conformsTo": [_to(each) for each in _PROFILES],
-            "hasPart": [_to(quote(each)) for each in self.files],
-            "mainEntity": _to(quote(main)),
-            "mentions": [_to(each) for each in [*actions, _PROGRAM]],
-        }
-        if study.doi:
-            root["identifier"] = f"https://doi.org/{study.doi}"
-        descriptor = {
-            "@id": METADATA,
-            "@type": "CreativeWork",
-            "about": _to("./"),
-            "conformsTo": [_to("https://w3id.org/ro/crate/1.1"), _to([*_PROFILES][-1])],
-        }
+        root = _entity(
+            "./", "Dataset", name=study.name,
+            description=study.note or f"{len(actions) - 1} runs of {study.problem.summary}",
+            datePublished=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+            license=licence, citation=attrs["cite"] if attrs["cite"] != NONE else PROGRAM,
+            conformsTo=[_to(each) for each in _PROFILES],
+            hasPart=[_to(quote(each)) for each in self.files], mainEntity=_to(quote(main)),
+            mentions=[_to(each) for each in [*actions, _PROGRAM]],
+            **({"identifier": f"https://doi.org/{study.doi}"} if study.doi else {}),
+        )  # fmt: skip
+        conforms = [_to("https://w3id.org/ro/crate/1.1"), _to([*_PROFILES][-1])]
+        descriptor = _entity(METADATA, "CreativeWork", about=_to("./"), conformsTo=conforms)
         profiles = [
-            {"@id": own, "@type": "CreativeWork", "name": name, "version": version}
+            _entity(own, "CreativeWork", name=name, version=version)
             for own, (name, version) in _PROFILES.items()
         ]
         self.entities[:0] = [descriptor, root, *profiles, *described]
@@ -426,7 +385,7 @@ def _license(given: str) -> tuple[Entity | str, list[Entity]]:
     if not re.fullmatch(rf"https?://\S+|{_SPDX}", given):
         return given, []
     own = given if given.startswith("http") else f"https://spdx.org/licenses/{given}"
-    return _to(own), [{"@id": own, "@type": "CreativeWork", "name": given}]
+    return _to(own), [_entity(own, "CreativeWork", name=given)]
 
 
 def _action(run_id: str, attrs: Mapping[str, Any], status: str, message: str) -> Entity:
@@ -434,32 +393,28 @@ def _action(run_id: str, attrs: Mapping[str, Any], status: str, message: str) ->
     failed = status not in SOLVED
     error = {"error": f"{status}: {message}".removesuffix(": ")} if failed else {}
     began = {"startTime": attrs["run_started"]} if "run_started" in attrs else {}
-    return {
-        "@id": f"#run-{run_id}",
-        "@type": "CreateAction",
-        "name": f"computation of the run {run_id}",
-        **began,
-        "endTime": attrs.get("run_ended", attrs["created"]),
-        "actionStatus": _FAILED if failed else _COMPLETED,
-        **error,
-    }
+    return _entity(
+        f"#run-{run_id}", "CreateAction", name=f"computation of the run {run_id}", **began,
+        endTime=attrs.get("run_ended", attrs["created"]),
+        actionStatus=_FAILED if failed else _COMPLETED, **error,
+    )  # fmt: skip
 
 
 def _formal(own: str, name: str, kind: str, examples: list[Entity], words: str) -> Entity:
-    return {
-        "@id": own,
-        "@type": "FormalParameter",
-        "conformsTo": _to(_BIOSCHEMAS.format("FormalParameter")),
-        "name": name,
-        "additionalType": kind,
-        "description": words,
-        "workExample": examples,
-    }
+    profile = _to(_BIOSCHEMAS.format("FormalParameter"))
+    return _entity(
+        own, "FormalParameter", conformsTo=profile, name=name, additionalType=kind,
+        description=words, workExample=examples,
+    )  # fmt: skip
 
 
 def _unpacked(value: Any) -> Any:
     """Return the only entry of a list instead of the list, as RO-Crate recommends."""
     return value[0] if isinstance(value, list) and len(value) == 1 else value
+
+
+def _entity(own: str, kind: str, **entries: Any) -> Entity:
+    return {"@id": own, "@type": kind, **entries}
 
 
 def _to(own: str) -> Entity:

@@ -17,7 +17,7 @@ from studies.definition.vocabulary import MISSING, SOLVED
 from studies.errors import StudyError, one_of
 from studies.numbers import number_text
 from studies.toml import CASE
-from studies.views.columns import aligned, value_text
+from studies.views.columns import aligned, unit_text, value_text
 from studies.views.picking import flags, own_grid, sweep_axes, sweep_coordinates
 
 _NOT_COMPARED = ("cpu_seconds", "round")
@@ -190,7 +190,7 @@ def difference_table(found: Difference) -> str:
     rows = [
         [
             each.variable, number_text(each.relative, 2), number_text(each.absolute),
-            each.unit if each.unit not in {"", "1"} else "", number_text(each.before, 6),
+            unit_text(each.unit), number_text(each.before, 6),
             number_text(each.after, 6), str(each.runs), _at({**each.run, **each.place}),
         ]
         for each in found.changes
@@ -360,10 +360,3 @@ def _same(first: np.ndarray, second: np.ndarray) -> bool:
     if first.shape != second.shape:
         return False
     return bool(np.allclose(first, second, rtol=0.0, atol=_SAME_GRID * np.max(np.abs(first))))
-
-
-def checked_number(found: Difference, name: str) -> str:
-    """Return the name of a number of the runs; raise `StudyError` if there is none."""
-    if name not in found.pairs:
-        raise StudyError("field", name, one_of(name, found.pairs))
-    return name

@@ -103,6 +103,12 @@ def group_of(name: str) -> str:
     return "effort" if name in EFFORT else "result"
 
 
+def varies(values: np.ndarray) -> bool:
+    """Whether numbers are not all the same, without those that are NaN."""
+    known = values[~np.isnan(values)]
+    return known.size > 0 and bool((known != known[0]).any())
+
+
 @dataclass(frozen=True, slots=True)
 class Worst:
     """The largest value of a figure of the audit.

@@ -10,7 +10,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from studies.numbers import typeset
-from studies.views.columns import plain, value_text
+from studies.views.columns import value_text, words
 
 
 @cache
@@ -24,7 +24,7 @@ def templates(package: str) -> Environment:
         undefined=StrictUndefined,
     )
     found.filters |= {
-        "words": lambda name: plain(str(name)),
+        "words": lambda name: words(str(name)),
         "number": number,
         "moment": lambda text: (text or "").replace("T", " ").removesuffix("+00:00"),
         "data": lambda content: json.dumps(content).replace("<", "\\u003c").replace("&", "\\u0026"),

@@ -20,14 +20,7 @@ _TEXT = "report.txt"
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The result of a study as text and files.
-
-    Attributes
-    ----------
-    text : the runs and their messages; the last line counts them
-    files : the file of the text, and of the picture if a run succeeded
-    anew : whether they were written now; false if they were kept
-    """
+    """The result of a study as text and files, and whether these were written now."""
 
     text: str
     files: list[Path]

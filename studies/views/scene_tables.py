@@ -47,11 +47,6 @@ def described_scene(what: str, texts: Mapping[str, str]) -> tuple[Scene, dict[st
     ----------
     what : name of a scene, path of a scene file, or path of a study file, whose first run counts
     texts : values of parameters as texts, which come before those of the study
-
-    Raises
-    ------
-    StudyError
-        if there is no such scene or parameter, or a file has a mistake
     """
     scene, values = _named(what)
     return scene, values | read_values(scene, texts)

@@ -12,7 +12,7 @@ from solver.results.quantities import QUANTITIES
 from solver.tensors import AXES
 from studies.errors import StudyError
 from studies.views.best import column_over
-from studies.views.columns import unit_text
+from studies.views.columns import meaning_of, unit_of
 from studies.views.plots.captions import DISTANCE
 from studies.views.plots.fields import (
     REPEATED,
@@ -193,8 +193,8 @@ def _described(run: xr.Dataset, name: str) -> dict[str, Any]:
         own["component"] = component_names(values)
     return {
         "name": name,
-        "words": str(values.attrs.get("long_name", name.replace("_", " "))),
-        "unit": _unit(values),
+        "words": meaning_of(values),
+        "unit": unit_of(values),
         **{f"{each}s": labels for each, labels in own.items() if each in values.dims},
         **({"flags": str(values.attrs["flag_meanings"]).split()} if _is_flag(values) else {}),
     }
@@ -204,16 +204,12 @@ def _axis(run: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]:
     words = str(name) if name in AXES else str(run[name].attrs.get("long_name", name))
     quantity = QUANTITIES.get(str(name))
     whole = quantity is not None and quantity.count
-    return {"name": str(name), "words": words, "unit": _unit(run[name]), "whole": whole}
+    return {"name": str(name), "words": words, "unit": unit_of(run[name]), "whole": whole}
 
 
 def _labels(values: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]:
     known = values[name].to_numpy().tolist() if name in values.coords else []
-    return {"name": str(name), "labels": known, "unit": _unit(values[name]) if known else ""}
-
-
-def _unit(values: xr.DataArray) -> str:
-    return unit_text(values.attrs.get("units"))
+    return {"name": str(name), "labels": known, "unit": unit_of(values[name]) if known else ""}
 
 
 def _is_flag(values: xr.DataArray) -> bool:

@@ -31,8 +31,9 @@ from studies.views.columns import (
     in_blocks,
     or_none,
     stacked,
-    unit_text,
+    unit_of,
     value_text,
+    with_unit,
 )
 from studies.views.figures import FIGURES, Floors, derived, elasticities, worst
 from studies.views.picking import flags, sweep_axes, sweep_coordinates
@@ -80,7 +81,7 @@ def runs_table(dataset: xr.Dataset) -> str:
     the run was to solve. Numbers taken at a singular point are marked.
     """
     cells = run_cells(dataset)
-    units = [*map(_bracketed, cells.units)]
+    units = [with_unit("", each) for each in cells.units]
     lines = [*stacked(cells.headings), units, *cells.rows]
     table = in_blocks(lines, cells.keys, right=cells.words)
     return f"{table}\n{FOOTNOTE}" if cells.marked else table
@@ -96,8 +97,8 @@ def run_cells(dataset: xr.Dataset) -> RunCells:
         "status",
         *(heading for heading, *_ in figures),
     ]
-    units: list[str] = [_unit(dataset[name]) for name in places]
-    units += ["", *(_unit(each) for _, each, _ in figures)]
+    units: list[str] = [unit_of(dataset[name]) for name in places]
+    units += ["", *(unit_of(each) for _, each, _ in figures)]
     values = {name: dataset[name].to_numpy() for name in (*places, "status")}
     floors = _floors(each for _, each, _ in figures)
     cells = [_cells(_clean(each, floors), spoiled) for _, each, spoiled in figures]
@@ -111,14 +112,14 @@ def run_cells(dataset: xr.Dataset) -> RunCells:
 
 
 def _floors(variables: Iterable[xr.DataArray]) -> Floors:
-    return Floors((_unit(each), each.to_numpy()) for each in variables if each.dtype.kind == "f")
+    return Floors((unit_of(each), each.to_numpy()) for each in variables if each.dtype.kind == "f")
 
 
 def _clean(values: xr.DataArray, floors: Floors) -> xr.DataArray:
     """Return numbers with zero for what is rounding beside others of their unit."""
     if values.dtype.kind != "f":
         return values
-    return values.copy(data=floors.clean(str(values.name), _unit(values), values.to_numpy()))
+    return values.copy(data=floors.clean(str(values.name), unit_of(values), values.to_numpy()))
 
 
 def _cells(values: xr.DataArray, spoiled: xr.DataArray) -> np.ndarray:
@@ -254,7 +255,7 @@ def run_details(dataset: xr.Dataset) -> str:
     floors = _floors(each for name, each in shown.items() if not name.startswith(_AUDIT))
     for name, each in shown.items():
         value = each if name.startswith(_AUDIT) else _clean(each, floors)
-        lines.append([name, f"{_figure(value)} {_bracketed(_unit(each))}".rstrip()])
+        lines.append([name, with_unit(_figure(value), unit_of(each))])
     return aligned(lines)
 
 
@@ -266,14 +267,6 @@ def _parameters(dataset: xr.Dataset) -> dict[str, Any]:
 def _figure(variable: xr.DataArray) -> str:
     """Return the single value of a variable as text; a flag as its meaning."""
     return flags(variable).get(variable.item()) or value_text(variable.item())
-
-
-def _unit(variable: xr.DataArray) -> str:
-    return unit_text(variable.attrs.get("units"))
-
-
-def _bracketed(unit: str) -> str:
-    return f"[{unit}]" if unit else ""
 
 
 BY_ACCURACY = "by accuracy"
@@ -330,10 +323,6 @@ def _range_text(numbers: list[Any]) -> str:
 def summary(study: xr.Dataset | Path | str) -> Summary:
     """Return a short view of a study that is stored.
 
-    Parameters
-    ----------
-    study : its data set, or what `open_study` opens
-
     Raises
     ------
     StudyError
@@ -355,7 +344,7 @@ def summary(study: xr.Dataset | Path | str) -> Summary:
         status="complete" if MISSING not in counts else "not complete",
         progress=1.0 - counts.get(MISSING, 0) / status.size,
         counts=counts,
-        axes={n: values_text(study[n].to_numpy().tolist(), _unit(study[n])) for n in names},
+        axes={n: values_text(study[n].to_numpy().tolist(), unit_of(study[n])) for n in names},
         audit=None
         if first is None
         else (first, place_of(study, np.unravel_index(first.at, status.shape))),

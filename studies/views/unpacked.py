@@ -33,11 +33,6 @@ class Unpacked(Store):
 
     The ids of runs are made of that of the data set, in which they are not.
 
-    Parameters
-    ----------
-    path : the data set
-    directory : an empty folder, in which the files of runs are made
-
     Attributes
     ----------
     study_id, run_ids : id of the study; id of each run, with its position

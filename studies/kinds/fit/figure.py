@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from solver.results.quantities import QUANTITIES
 from studies.numbers import number_text
-from studies.views.plots.captions import axis_label, label, words, wrapped
+from studies.views.columns import unit_of, words
+from studies.views.plots.captions import axis_label, label, wrapped
 from studies.views.plots.sheets import add_head, plain_axes
 
 _PANEL = (4.6, 4.4)
@@ -20,18 +21,13 @@ _ABREAST = 4
 _LINE, _MARKS = "#D55E00", "0.35"
 
 
-def compared(dataset: xr.Dataset) -> Figure | None:
-    """Return `fit_figure`; None if there is no answer."""
-    return fit_figure(dataset) if dataset["fitted"].notnull().all() else None
+def fit_figure(dataset: xr.Dataset) -> Figure | None:
+    """Return two panels for each measured line: it and the run found, and their differences.
 
-
-def fit_figure(dataset: xr.Dataset) -> Figure:
-    """Return two panels for each measured line: it and the run with the values found, differences.
-
-    Parameters
-    ----------
-    dataset : data set of a fit
+    None if there is no answer.
     """
+    if not dataset["fitted"].notnull().all():
+        return None
     count = dataset.sizes["lines"]
     abreast = min(count, _ABREAST)
     rows = math.ceil(count / abreast)
@@ -91,5 +87,4 @@ def _declared(name: str) -> xr.DataArray:
 def _sure(dataset: xr.Dataset, name: str) -> str:
     """Return the value of a parameter and its standard deviation."""
     value, sigma = dataset[name].item(), dataset[f"{name}_sigma"].item()
-    unit = dataset[name].attrs.get("units", "1")
-    return f"{number_text(value)} ± {number_text(sigma, 2)}" + ("" if unit == "1" else f" {unit}")
+    return f"{number_text(value)} ± {number_text(sigma, 2)} {unit_of(dataset[name])}".rstrip()

@@ -65,7 +65,7 @@ class Fit(Ranged):
     answers = Late("studies.kinds.fit.answer:answers")
     found = Late("studies.kinds.fit.shown:found")
     table = Late("studies.kinds.fit.shown:fit_table")
-    figure = Late("studies.kinds.fit.figure:compared")
+    figure = Late("studies.kinds.fit.figure:fit_figure")
 
     measured: Annotated[list[MeasuredLine], Field(min_length=1, max_length=1000)]
     step: Annotated[Number, Interval(ge=1e-4, le=0.5)] = 0.05

@@ -158,11 +158,6 @@ class MeasuredLine(StudyTable):
         """Return `seen`, and its derivatives by parameters, times the widths of their ranges.
 
         The columns (n, 1 + n_parameters) of derivatives that the run lacks are NaN.
-
-        Raises
-        ------
-        ValueError
-            as of `seen`
         """
         columns = [self.seen(read)]
         for by, width in widths.items():

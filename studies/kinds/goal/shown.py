@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from studies.kinds.kind import Found, Mark
-from studies.views.columns import or_none, plain, value_text
+from studies.views.columns import or_none, unit_of, value_text, words
 from studies.views.picking import sweep_axes, sweep_coordinates
 from studies.views.tables import run_cells
 
@@ -28,7 +28,7 @@ def found(dataset: xr.Dataset, goal: Mapping[str, Any]) -> Found:
     within = f"bracket at most {value_text(100.0 * goal['within'])} % of its upper end"
     return Found(
         about=[
-            f"The {plain(name)} from {low} to {high} at which {_reached(goal, dataset)}; {within}."
+            f"The {words(name)} from {low} to {high} at which {_reached(goal, dataset)}; {within}."
         ],
         headings=[*cells.headings[:at], *more, *cells.headings[at:]],
         units=[*cells.units[:at], *([""] if more else []), *cells.units[at:]],
@@ -42,11 +42,11 @@ def _reached(goal: Mapping[str, Any], dataset: xr.Dataset) -> str:
     """Return in words when a goal is reached."""
     if not goal.get("of"):
         return "there is no equilibrium any more"
-    words = {"at": "is", "first_above": "is above", "first_below": "is below"}
-    kind = next(each for each in words if each in goal)
-    unit = dataset[f"tried_{goal['of']}"].attrs.get("units", "1")
-    measured = value_text(goal[kind]) if unit == "1" else f"{value_text(goal[kind])} {unit}"
-    return f"{plain(goal['of'])} {words[kind]} {measured}"
+    verbs = {"at": "is", "first_above": "is above", "first_below": "is below"}
+    kind = next(each for each in verbs if each in goal)
+    unit = unit_of(dataset[f"tried_{goal['of']}"])
+    value = f"{value_text(goal[kind])} {unit}".rstrip()
+    return f"{words(goal['of'])} {verbs[kind]} {value}"
 
 
 def _places(dataset: xr.Dataset, name: str) -> list[Mark]:

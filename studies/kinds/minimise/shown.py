@@ -10,7 +10,7 @@ import xarray as xr
 from studies.errors import StudyError
 from studies.kinds.kind import Found
 from studies.views.best import best_runs
-from studies.views.columns import unit_text, value_text
+from studies.views.columns import unit_of, value_text
 
 
 def found(dataset: xr.Dataset, asked: Mapping[str, Any]) -> Found:
@@ -26,7 +26,7 @@ def found(dataset: xr.Dataset, asked: Mapping[str, Any]) -> Found:
         about=[f"Least {asked['of']}{where}: {dataset.sizes['point']} runs, {state}."],
         warning=warning,
         headings=names,
-        units=[unit_text(dataset[name].attrs.get("units")) for name in names],
+        units=[unit_of(dataset[name]) for name in names],
         rows=[list(map(value_text, run.values())) for run in best],
         words=0,
         # a run alone has no axis to mark it on

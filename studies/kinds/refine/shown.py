@@ -11,7 +11,7 @@ import xarray as xr
 
 from studies.kinds.kind import Found
 from studies.kinds.refine.cells import ERROR
-from studies.views.columns import plain, unit_text, value_text
+from studies.views.columns import unit_of, value_text, words
 
 
 def found(dataset: xr.Dataset, refine: Mapping[str, Any]) -> Found:
@@ -23,12 +23,12 @@ def found(dataset: xr.Dataset, refine: Mapping[str, Any]) -> Found:
     for name in numbers:
         left, values = dataset[f"{ERROR}{name}"].max().item(), dataset[name]
         width = values.max().item() - values.min().item()
-        unit = unit_text(values.attrs.get("units"))
+        unit = unit_of(values)
         share = 100.0 * left / width if width > 0.0 else np.nan
-        rows.append([plain(name), value_text(left), unit, value_text(share)])
+        rows.append([words(name), value_text(left), unit, value_text(share)])
     until = refine["until"]
     if isinstance(until, Mapping):
-        miss = ", ".join(f"{plain(name)} by {value_text(each)}" for name, each in until.items())
+        miss = ", ".join(f"{words(name)} by {value_text(each)}" for name, each in until.items())
     else:
         miss = f"a number by {value_text(100.0 * until)} % of its range"
     return Found(

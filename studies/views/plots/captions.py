@@ -19,8 +19,15 @@ from studies.materials import MATERIAL
 from studies.numbers import number_text
 from studies.scenes.registry import scene_of
 from studies.storage.frame import FRACTION, SETS
-from studies.views.columns import COMPUTED, computed_text, counted
-from studies.views.columns import plain as in_words
+from studies.views.columns import (
+    COMPUTED,
+    computed_text,
+    counted,
+    unit_of,
+    unit_text,
+    with_unit,
+    words,
+)
 from studies.views.picking import flags
 
 _STAY = "\N{NO-BREAK SPACE}"
@@ -28,14 +35,9 @@ _STRENGTH = "yield_stress"
 """The parameter that says which steel it is."""
 
 
-def words(identifier: str) -> str:
-    """Return an identifier in words."""
-    return in_words(identifier)
-
-
 def value_text(coordinate: xr.DataArray) -> str:
     """Return a coordinate's single value with its unit."""
-    return _text(coordinate.item(), coordinate.attrs.get("units", ""))
+    return _text(coordinate.item(), unit_of(coordinate))
 
 
 def named(name: str, value: Any, unit: str = "") -> str:
@@ -48,7 +50,7 @@ def named(name: str, value: Any, unit: str = "") -> str:
 def label(variable: xr.DataArray) -> str:
     """Return the meaning of a variable with its symbol and unit, for an axis."""
     name = variable.attrs.get("long_name", str(variable.name))
-    return _measured(f"{name} {symbol(variable)}".rstrip(), variable)
+    return with_unit(f"{name} {symbol(variable)}".rstrip(), unit_of(variable))
 
 
 _SYMBOLS = {
@@ -88,12 +90,12 @@ def axis_label(coordinate: xr.DataArray) -> str:
     usual = f"${name}$" if name in AXES else coordinate.attrs.get("long_name", words(name))
     if name == DISTANCE and "distance" in usual:
         usual = f"{usual.replace('distance s ', 'distance ')} $s$"
-    return _measured(_LENGTHS.get(name, usual), coordinate)
+    return with_unit(_LENGTHS.get(name, usual), unit_of(coordinate))
 
 
 def short_label(variable: xr.DataArray) -> str:
     """Return the name of a parameter or a figure in words, with its unit."""
-    return _measured(words(str(variable.name)), variable)
+    return with_unit(words(str(variable.name)), unit_of(variable))
 
 
 def capitalised(text: str) -> str:
@@ -126,7 +128,7 @@ def setting(run: xr.Dataset) -> str:
             computed_text(plain(each.item(), known[name].default), _computed(run, str(name)))
             if name in known
             else each.item(),
-            each.attrs.get("units", ""),
+            unit_of(each),
         )
         for name, each in run.coords.items()
         if each.ndim == 0 and not str(name).endswith(FRACTION) and name not in idle
@@ -203,9 +205,4 @@ def wrapped(text: str, width: float, points: int) -> str:
 
 def _text(value: Any, unit: str) -> str:
     text = number_text(value, 6) if isinstance(value, int | float) else words(counted(value))
-    return text if unit in {"", "1"} or isinstance(value, str) else f"{text} {unit}"
-
-
-def _measured(name: str, variable: xr.DataArray) -> str:
-    unit = variable.attrs.get("units", "1")
-    return name if unit == "1" else f"{name} [{unit}]"
+    return text if not unit_text(unit) or isinstance(value, str) else f"{text} {unit}"

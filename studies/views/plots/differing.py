@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.errors import StudyError
-from studies.views.differing import Difference, checked_number
-from studies.views.plots.captions import capitalised, words
+from studies.errors import StudyError, one_of
+from studies.views.columns import words
+from studies.views.differing import Difference
+from studies.views.plots.captions import capitalised
 from studies.views.plots.sheets import add_head
 
 _BARS = 14
@@ -20,11 +21,6 @@ _LEAST = 1e-17
 def difference_figure(found: Difference, field: str | None = None) -> Figure:
     """Return a figure of the largest relative changes, and of a number of the runs in both studies.
 
-    Parameters
-    ----------
-    found : what `diff` returned
-    field : the number; by default the one that changed most
-
     Raises
     ------
     StudyError
@@ -33,7 +29,9 @@ def difference_figure(found: Difference, field: str | None = None) -> Figure:
     if not found.pairs:
         raise StudyError("runs", found.common, "no run has results in both studies")
     changed = [each.variable for each in found.changes if each.variable in found.pairs]
-    name = checked_number(found, field or next(iter([*changed, *found.pairs])))
+    name = field or [*changed, *found.pairs][0]
+    if name not in found.pairs:
+        raise StudyError("field", name, one_of(name, found.pairs))
     figure = Figure(figsize=(10.5, 4.6), layout="constrained")
     bars, pairs = figure.subplots(1, 2, width_ratios=(1.0, 1.0))
     _draw_changes(bars, found)

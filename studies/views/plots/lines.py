@@ -16,8 +16,9 @@ from matplotlib.ticker import MaxNLocator
 
 from solver.tensors import AXES
 from studies.errors import StudyError, one_of
+from studies.views.columns import words
 from studies.views.picking import one_run, sweep_axes
-from studies.views.plots.captions import DISTANCE, axis_label, label, value_text, words, wrapped
+from studies.views.plots.captions import DISTANCE, axis_label, label, value_text, wrapped
 from studies.views.plots.fields import (
     REPEATED,
     Window,

@@ -13,6 +13,7 @@ import xarray as xr
 from solver.model.friction import PatchStatus
 from studies.errors import StudyError, one_of
 from studies.numbers import typeset_number
+from studies.views.columns import unit_of
 from studies.views.plots.fields import (
     Window,
     check_field,
@@ -75,12 +76,7 @@ def mapped(
 ) -> Mapped:
     """Return the values of a map of a run, with both halves if one half was computed.
 
-    The arguments are those of `map_figure`; ``run`` is that of `one_run`.
-
-    Raises
-    ------
-    StudyError
-        if the run has no such field, component or stage, or the part has no points
+    Arguments and errors are those of `map_figure`; ``run`` is that of `one_run`.
     """
     field = field or usual_field(run)
     check_field(field, map_fields(run))
@@ -175,7 +171,7 @@ def limit(there: np.ndarray, area: np.ndarray, signed: bool, of: xr.DataArray) -
     area : (n,) of each of them
     of : the quantity, with its unit
     """
-    size, unit = np.abs(there) if signed else there, str(of.attrs.get("units", "1"))
+    size, unit = np.abs(there) if signed else there, unit_of(of)
     if not size.size or not size.max() > 0.0:
         return 1.0, none_of(of) if unit == "MPa" else ""
     high = _percentile(size[size > 0.0], area[size > 0.0])
@@ -185,7 +181,7 @@ def limit(there: np.ndarray, area: np.ndarray, signed: bool, of: xr.DataArray) -
     beyond = f"{area[size > high].sum() / area.sum():.1%} of the map lies beyond"
     return high, (
         f"Colours end at {'±' if signed else ''}{typeset_number(high, 3)}"
-        f"{'' if unit == '1' else f' {unit}'}: {beyond}. Values go from {least} to {most}."
+        f"{f' {unit}' if unit else ''}: {beyond}. Values go from {least} to {most}."
     )
 
 

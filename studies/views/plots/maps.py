@@ -24,7 +24,7 @@ from studies.definition.parameters import parameters_of
 from studies.errors import StudyError
 from studies.numbers import number_text
 from studies.scenes.registry import scene_of
-from studies.views.columns import COMPUTED
+from studies.views.columns import COMPUTED, unit_of, with_unit
 from studies.views.picking import one_run
 from studies.views.plots.captions import capitalised, label, setting, symbol, wrapped
 from studies.views.plots.fields import (
@@ -80,9 +80,8 @@ def draw_patch(axes: Axes, run: xr.Dataset, field: str, window: Window) -> None:
             u[across], u[up], u, v, units="xy", angles="xy", scale_units="xy",
             scale=longest / (1.2 * step), width=step / 12, color="0.1",
         )  # fmt: skip
-        unit = arrows[0].attrs.get("units", "1")
         name = f"{kind.removeprefix('patch_')} on the surface, at most {number_text(longest, 3)}"
-        label = name if unit == "1" else f"{name} {unit}"
+        label = f"{name} {unit_of(arrows[0])}".rstrip()
         handles.append(Line2D([], [], color="0.1", marker=r"$\rightarrow$", ls="none", label=label))
     down = ScaledTranslation(0.0, BELOW / 72.0, axes.figure.dpi_scale_trans)
     axes.legend(  # not on the map: a contact that is long one way leaves no corner free
@@ -435,4 +434,4 @@ def _last_pass(run: xr.Dataset) -> dict[str, xr.DataArray]:
 
 def _symbol(coordinate: xr.DataArray) -> str:
     """Return the name of a map's axis, with its unit."""
-    return f"${coordinate.name}$ [{coordinate.attrs.get('units', '1')}]"
+    return with_unit(f"${coordinate.name}$", unit_of(coordinate))

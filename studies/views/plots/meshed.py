@@ -82,12 +82,7 @@ def on_mesh(
 ) -> MappedMesh:
     """Return the values of a map at the nodes, with both halves if one half was computed.
 
-    The arguments are those of `map_figure`; ``field`` is one of `mesh_maps`.
-
-    Raises
-    ------
-    StudyError
-        if there is no such component or stage, or the part contains no nodes
+    Arguments and errors are those of `map_figure`; ``field`` is one of `mesh_maps`.
     """
     fields = read(run)
     at = _stage_of(fields, field, stage)

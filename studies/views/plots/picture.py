@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -43,6 +44,8 @@ from studies.views.plots.sheets import png, resolved
 from studies.views.plots.sweep import sweep_figure
 from studies.views.reading import find_study, open_netcdf
 from studies.views.solution import keeps
+
+Chosen = TypeVar("Chosen", bound=str | float)
 
 
 def picture(
@@ -107,9 +110,7 @@ def picture(
         one_run(dataset)  # without a successful run there are no fields: report the reason
         check_field(field, [*maps, *lines, *singles, *labelled])
         if field in maps:
-            _refuse(
-                {"over": over, "against": against}, f"{field} is a map of one run: leave it out"
-            )
+            _refuse(alone, f"{field} is a map of one run: leave it out")
             part = _part(dataset, field, selection or {})
             figure = map_figure(part, field, component, zoom, window, deformed=deformed or 0.0)
         else:
@@ -137,9 +138,13 @@ def _refuse(given: Mapping[str, object], allowed: str) -> None:
 
 def _single(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> bool:
     """Whether the selection leaves one run."""
-    swept = sweep_coordinates(dataset)
-    chosen = {name: value for name, value in selection.items() if name in swept}
-    return bool(select(dataset, chosen)["status"].size == 1)
+    return bool(select(dataset, _swept(dataset, selection))["status"].size == 1)
+
+
+def _swept(dataset: xr.Dataset, selection: Mapping[str, Chosen]) -> dict[str, Chosen]:
+    """Return the part of a selection that is one of runs, not of dimensions of a field."""
+    known = sweep_coordinates(dataset)
+    return {name: value for name, value in selection.items() if name in known}
 
 
 def _labelled(
@@ -161,7 +166,7 @@ def _labelled(
         else:
             values = values.isel({name: 0})
     runs = dataset[["status", "message"]].assign({field: values})
-    return select(runs, {name: selection[name] for name in swept if name in selection})
+    return select(runs, _swept(dataset, selection))
 
 
 def _last(values: xr.DataArray, name: str) -> xr.DataArray:
@@ -205,7 +210,7 @@ def _part(
     """
     swept, own = sweep_coordinates(dataset), _own(dataset, field, against)
     _known(selection, [*swept, *own])
-    chosen = {name: selection[name] for name in swept if name in selection}
+    chosen = _swept(dataset, selection)
     if over is None:
         run = one_run(dataset, chosen)
     else:
@@ -229,8 +234,7 @@ def drawn_from(
     if found is None:
         yield dataset, selection
         return
-    swept = sweep_coordinates(dataset)
-    chosen = {name: value for name, value in selection.items() if name in swept}
+    swept, chosen = sweep_coordinates(dataset), _swept(dataset, selection)
     with open_netcdf(found) as own:
         left = {name: value for name, value in selection.items() if name not in swept}
         of = one_run(dataset, chosen)  # what distinguishes the run stands in the caption
@@ -253,9 +257,7 @@ def _run_of(
         return None
     if not study.keep:
         return None
-    swept = sweep_coordinates(dataset)
-    chosen = {name: each for name, each in selection.items() if name in swept}
-    return file_of(dataset, study, store, chosen)
+    return file_of(dataset, study, store, _swept(dataset, selection))
 
 
 def report_pictures(dataset: xr.Dataset, kind: Kind, path: Path | None) -> dict[str, bytes]:

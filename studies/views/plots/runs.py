@@ -15,8 +15,8 @@ from matplotlib.transforms import Transform
 from studies.definition.cases import USUAL_AXES
 from studies.definition.vocabulary import OK, OUTSIDE_THEORY, STATUSES
 from studies.errors import StudyError
+from studies.views.columns import words
 from studies.views.picking import flags, parameters_over, point_axes, sweep_axes, sweep_coordinates
-from studies.views.plots.captions import words
 from studies.views.rules import NUMBERS, REASONS, SIGNED
 
 _CATEGORIES = (

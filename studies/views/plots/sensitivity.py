@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.numbers import number_text
+from studies.views.columns import words
 from studies.views.picking import select
-from studies.views.plots.captions import capitalised, short_label, words
+from studies.views.plots.captions import capitalised, short_label
 from studies.views.plots.runs import known_values
 from studies.views.plots.sheets import plain_axes
 from studies.views.sensitivity import main_index, ordered
@@ -31,11 +32,6 @@ def sensitivity_figure(
     Above: bars of the indices, of ``chaos`` with what they are known to, and a tornado: how far the
     mean of the number moves along each parameter. Below: the runs over each parameter, and this
     mean. The parameter of the largest index comes first.
-
-    Parameters
-    ----------
-    dataset, selection : the runs, as `sensitivity` had them
-    found : what `sensitivity` returned
     """
     found = found.isel(parameter=ordered(found))
     names = [str(name) for name in found["parameter"].to_numpy()]

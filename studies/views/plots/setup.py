@@ -30,8 +30,9 @@ from solver.tensors import AXES
 from studies.definition.parameters import build, defaults, parameters_of
 from studies.errors import StudyError
 from studies.numbers import typeset_number
+from studies.views.columns import words
 from studies.views.plots.acting import acting, draw_acting, draw_supports, outward
-from studies.views.plots.captions import capitalised, named, words, wrapped
+from studies.views.plots.captions import capitalised, named, wrapped
 from studies.views.plots.fields import Window, empty_window
 from studies.views.plots.meshed import Array, Box
 from studies.views.plots.sheets import STYLES

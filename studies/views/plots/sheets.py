@@ -18,8 +18,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from studies.errors import StudyError
 from studies.numbers import number_text
+from studies.views.columns import words
 from studies.views.picking import sweep_axes
-from studies.views.plots.captions import capitalised, setting, short_label, words, wrapped
+from studies.views.plots.captions import capitalised, setting, short_label, wrapped
 from studies.views.rules import MOST_LINES, NUMBERS
 
 STYLES: Sequence[Any] = ("-", "--", ":", "-.", (0, (8, 2, 1, 2, 1, 2)), (0, (1, 4)))
@@ -129,13 +130,7 @@ def resolved(figure: Figure, resolution: float | None) -> Figure:
 
 
 def save(figure: Figure, to: Path | IO[bytes], kind: str = "png") -> None:
-    """Write a figure in its resolution, or the finest that its size allows.
-
-    Parameters
-    ----------
-    to : name of a file, or a file
-    kind : one of the formats of matplotlib, such as ``"svg"``
-    """
+    """Write a figure in its resolution, or the finest that its size allows."""
     figure.set_dpi(min(figure.dpi, _SIDE / max(figure.get_size_inches())))
     figure.savefig(to, format=kind, dpi=figure.dpi)  # matplotlib's default may be another dpi
 

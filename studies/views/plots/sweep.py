@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from studies.errors import StudyError
-from studies.views.columns import counted
+from studies.views.columns import counted, unit_of, words
 from studies.views.picking import (
     flags,
     only_numbers,
@@ -24,13 +24,7 @@ from studies.views.picking import (
     sweep_axes,
     to_grid,
 )
-from studies.views.plots.captions import (
-    capitalised,
-    named,
-    short_label,
-    value_text,
-    words,
-)
+from studies.views.plots.captions import capitalised, named, short_label, value_text
 from studies.views.plots.fields import without_rounding
 from studies.views.plots.limits import draw_shakedown_limits
 from studies.views.plots.runs import (
@@ -134,10 +128,7 @@ def sweep_figure(dataset: xr.Dataset, field: str) -> Figure:
         if overlay:
             drawn += overlay(axes, panel, axes in grid[:, -1])
         legend |= {each.get_label(): each for each in drawn}
-        title = (
-            named(str(each.name), panel[each.name].item(), each.attrs.get("units", ""))
-            for each in others
-        )
+        title = (named(str(each.name), panel[each.name].item(), unit_of(each)) for each in others)
         axes.set_title(", ".join(title), fontsize=10)
         axes.grid(color="0.92")
         axes.set_axisbelow(True)
@@ -182,14 +173,15 @@ def _arrangement(dataset: xr.Dataset, field: str) -> list[xr.DataArray]:
     several = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     others = [dataset[axis] for axis in several if (axis,) not in used]
     panels = math.prod(each.size for each in others)
-    if panels > MOST_PANELS:
-        axes = ", ".join(str(each.dims[0]) for each in others)
-        raise StudyError(
-            "field",
-            field,
-            f"would take {panels} panels, at most {MOST_PANELS} are drawn: select values of {axes}",
-        )
+    _check_most(field, panels, "panels", MOST_PANELS, [str(each.dims[0]) for each in others])
     return [*numbers, *others]
+
+
+def _check_most(field: str, count: int, what: str, most: int, others: Sequence[str]) -> None:
+    """Refuse to draw more than can be told apart."""
+    if count > most:
+        allowed = f"would take {count} {what}, at most {most} are drawn: select values of "
+        raise StudyError("field", field, allowed + ", ".join(others))
 
 
 def _draw(
@@ -240,11 +232,6 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
     If only labels are swept, they are on the horizontal axis. Runs without a value are marked at
     the bottom by their status.
 
-    Parameters
-    ----------
-    dataset : data set of a study
-    field : one of its variables with one value per run
-
     Raises
     ------
     StudyError
@@ -256,13 +243,7 @@ def curve_figure(dataset: xr.Dataset, field: str) -> Figure:
         raise StudyError("field", field, allowed)
     across, *others = [*numbers, *labels]
     curves = math.prod(each.size for each in others)
-    if curves > MOST_LINES:
-        rest = ", ".join(str(each.name) for each in others)
-        raise StudyError(
-            "field",
-            field,
-            f"would take {curves} curves, at most {MOST_LINES} are drawn: select values of {rest}",
-        )
+    _check_most(field, curves, "curves", MOST_LINES, [str(each.name) for each in others])
     style_of(dataset, field)  # raises an error if no run has a value
     sheet = Figure(figsize=_CURVES, dpi=150, layout="constrained")
     axes = sheet.add_subplot()
@@ -313,12 +294,6 @@ def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
     Each run is a mark in every panel, with a colour for each combination of the other axes. Runs
     without a value are marked at the bottom by their status.
 
-    Parameters
-    ----------
-    dataset : data set of a study
-    field : one of its variables with one value per run
-    points : the axis of points
-
     Raises
     ------
     StudyError
@@ -328,10 +303,7 @@ def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
     names = parameters_over(dataset, points)
     others = [a for a in sweep_axes(dataset) if a != points and dataset.sizes[a] > 1]
     count = math.prod(dataset.sizes[axis] for axis in others)
-    if count > MOST_LINES:
-        rest = ", ".join(others)
-        allowed = f"would take {count} colours, at most {MOST_LINES} are drawn: select {rest}"
-        raise StudyError("field", field, allowed)
+    _check_most(field, count, "colours", MOST_LINES, others)
     rows = -(-len(names) // _ABREAST)
     columns = -(-len(names) // rows)
     size = _CLOUD[0] * columns + _NAMES, _CLOUD[1] * rows + 0.9
@@ -346,7 +318,7 @@ def cloud_figure(dataset: xr.Dataset, field: str, points: str) -> Figure:
             one = series.isel(series=k).squeeze()
             places = [one[axis] for axis in others]
             label = ", ".join(
-                named(str(each.name), each.item(), each.attrs.get("units", "")) for each in places
+                named(str(each.name), each.item(), unit_of(each)) for each in places
             )  # without a label, matplotlib's begins with "_"
             for each in _draw_cloud(
                 axes, one, field, name, RunMark(name=label, marker="o", colour=colour)

@@ -439,7 +439,7 @@ def test_a_caption_has_no_units_of_words() -> None:
 
 def test_a_contact_is_drawn_with_its_edges_and_its_shear() -> None:
     axes, mesh = mesh_of(map_figure(rolled(), "patch_pressure"))
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$z$ [1]", "$x$ [1]")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$z$", "$x$")
     assert axes.get_xlim() == (-3.5, 3.5)  # a fifth of 8 mm around it
     assert axes.get_ylim() == (-5.5, 5.5)
     assert np.ma.count(np.ma.masked_invalid(mesh.get_array())) == 9 * 5
