@@ -48,7 +48,8 @@ class About(logging.Filter):
     def filter(self, record: logging.LogRecord) -> bool:
         """Add the ids."""
         error = record.exc_info[1] if record.exc_info else None
-        if error and {record.name.split(".")[0], _package(error)} & {*CONNECTIONS}:
+        of = {each.split(".")[0] for each in (record.name, type(error).__module__)}
+        if error and of & {*CONNECTIONS}:
             said = f"{record.getMessage()} {type(error).__name__}: {error}"
             record.msg, record.args, record.exc_info = " ".join(said.split()), (), None
         known = {"request": REQUEST.get(), **self.ids, **vars(record)}
@@ -56,10 +57,6 @@ class About(logging.Filter):
         about = "".join(f" {name}={value}" for name, value in entry.items())
         vars(record).update(entry, about=about)
         return True
-
-
-def _package(error: BaseException) -> str:
-    return type(error).__module__.split(".")[0]
 
 
 def configure(form: str, **ids: str) -> None:

@@ -53,8 +53,6 @@ def _arrays(description: Description) -> dict[str, str]:
 
 
 def _fields_of(mistake: StudyError) -> tuple[str, object, str]:
-    return mistake.field, _plain(mistake.value), mistake.allowed
-
-
-def _plain(value: object) -> object:
-    return value if isinstance(value, str | int | float | bool | None) else repr(value)
+    value = mistake.value
+    plain = value if isinstance(value, str | int | float | bool | None) else repr(value)
+    return mistake.field, plain, mistake.allowed

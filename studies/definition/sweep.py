@@ -143,7 +143,9 @@ def checked_axes(content: Any, context: Context) -> Axes:
         for parameter in [*at.sets, *([CASE] if at.case else [])]:
             other = first.setdefault(parameter, name)
             if other != name or (parameter == CASE and CASE in axes):
-                where = f"which {_field(other if other != name else CASE, axes)} sets too"
+                own = other if other != name else CASE
+                field = field_of(own) if is_points(axes[own]) else f"sweep.{own}"
+                where = f"which {field} sets too"
                 allowed = f"sets {parameter}, {where}: keep one"
                 wrong.add("", StudyError(name, content[name], allowed))
     wrong.report()
@@ -159,11 +161,6 @@ Sweep = Annotated[
     ),
 ]
 """The axes of a study, see `checked_axes`."""
-
-
-def _field(name: str, axes: Axes) -> str:
-    """Return the entry of a study that has an axis."""
-    return field_of(name) if is_points(axes[name]) else f"sweep.{name}"
 
 
 def owners(axes: Axes) -> dict[str, str]:

@@ -65,8 +65,13 @@ def seal(path: Path, name: str) -> None:
 
 def state_of(path: Path) -> State | None:
     """Return inode, length and times of change [ns] of a path; None if there is nothing."""
-    found = _stat(path)
-    return None if found is None else _state(found)
+    try:
+        found = path.stat()
+    except OSError as error:
+        if error.errno not in _NO_FILE:
+            raise
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 def check(path: Path, name: str = "") -> None:
@@ -148,19 +153,6 @@ def _no_file_is_damage(path: Path, name: str, state: State | None, *also: int) -
         if not isinstance(error, NoFile) and error.errno not in {*_NO_FILE, *also}:
             raise
         raise FileDamaged(path, name, str(error.strerror), state) from None
-
-
-def _stat(path: Path) -> os.stat_result | None:
-    try:
-        return path.stat()
-    except OSError as error:
-        if error.errno not in _NO_FILE:
-            raise
-        return None
-
-
-def _state(found: os.stat_result) -> State:
-    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 @lru_cache(maxsize=4096)

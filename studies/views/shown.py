@@ -189,6 +189,7 @@ def _described(run: xr.Dataset, name: str) -> dict[str, Any]:
     """Return name, meaning and unit of a variable, and its components and stages."""
     values = run[name]
     own = {"stage": _labels(run, "stage")["labels"]}
+    flags = str(values.attrs.get("flag_meanings", "")).split()
     if "component" in values.dims:
         own["component"] = component_names(values)
     return {
@@ -196,7 +197,7 @@ def _described(run: xr.Dataset, name: str) -> dict[str, Any]:
         "words": meaning_of(values),
         "unit": unit_of(values),
         **{f"{each}s": labels for each, labels in own.items() if each in values.dims},
-        **({"flags": str(values.attrs["flag_meanings"]).split()} if _is_flag(values) else {}),
+        **({"flags": flags} if flags else {}),
     }
 
 
@@ -210,7 +211,3 @@ def _axis(run: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]:
 def _labels(values: xr.Dataset | xr.DataArray, name: Hashable) -> dict[str, Any]:
     known = values[name].to_numpy().tolist() if name in values.coords else []
     return {"name": str(name), "labels": known, "unit": unit_of(values[name]) if known else ""}
-
-
-def _is_flag(values: xr.DataArray) -> bool:
-    return "flag_meanings" in values.attrs

@@ -81,7 +81,7 @@ def as_parquet(columns: Columns, at: np.ndarray) -> Iterator[bytes]:
     schema = pa.schema(
         pa.field(
             each.name,
-            pa.float64() if _is_number(each) else pa.string(),
+            pa.float64() if each.number and not each.flags else pa.string(),
             metadata={"long_name": each.words, "units": each.unit},
         )
         for each in columns
@@ -129,11 +129,6 @@ class _Pieces(io.RawIOBase):
 
 def _parts(at: np.ndarray, size: int) -> Iterator[np.ndarray]:
     return (at[first : first + size] for first in range(0, len(at), size))
-
-
-def _is_number(column: Column) -> bool:
-    """Whether the values are numbers that do not stand for words."""
-    return column.number and not column.flags
 
 
 def _values(column: Column, at: np.ndarray) -> list[Any]:

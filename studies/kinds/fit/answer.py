@@ -77,7 +77,8 @@ def certainty(fit: Fit, answer: Fitted) -> Certainty:
             if sizes[0] / size >= _CONDITION:
                 apart = [names[used[k]] for k in np.flatnonzero(share > _SHARE)]
                 if len(apart) > 1:
-                    warnings.append(f"{_listed(apart)} cannot be told apart by what was measured")
+                    listed = f"{', '.join(apart[:-1])} and {apart[-1]}"
+                    warnings.append(f"{listed} cannot be told apart by what was measured")
     covariance = fit.spread(answer.seen) * inverse * np.outer(slopes, slopes)
     sigma = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sigma, sigma)
@@ -85,10 +86,6 @@ def certainty(fit: Fit, answer: Fitted) -> Certainty:
     if text and math.isfinite(condition):
         text += f": the condition of the Jacobian matrix is {condition:.3g}"
     return Certainty(covariance, correlation, condition, text)
-
-
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 NOT_FOUND = "not_converged"

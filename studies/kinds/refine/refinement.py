@@ -449,7 +449,7 @@ class Refinement(Chooser):
     def _settle(self, found: RefinedCell) -> None:
         """Keep a cell that is not divided."""
         self.settled.append(found)
-        self._share += _volume(found.cell)
+        self._share += 0.5 ** sum(found.cell.halved)  # of its cell of the sweep
 
     def _halve(self, cell: Cell, axes: set[int], miss: float, left: tuple[float, ...]) -> None:
         """Keep a cell to be divided along those of some axes along which it can be."""
@@ -560,8 +560,3 @@ def _within(cell: Cell, points: Sequence[Point]) -> set[int]:
     """Return the axes along which points are between the ends of a cell."""
     ends = (zip(cell.low, at, cell.high, strict=True) for at in points)
     return {k for each in ends for k, (low, x, high) in enumerate(each) if low < x < high}
-
-
-def _volume(cell: Cell) -> float:
-    """Return the size of a cell as a share of its cell of the sweep."""
-    return 0.5 ** sum(cell.halved)
