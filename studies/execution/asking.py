@@ -50,31 +50,20 @@ class Asking:
     places : the programs with their runs, in the order of `Kind.programs`
     """
 
-    def __init__(
-        self,
-        study: Study,
-        store: Store,
-        resume: bool = False,
-        since: int = 0,
-    ) -> None:
+    def __init__(self, study: Study, store: Store, resume: bool = False, since: int = 0) -> None:
         self._study, self._store = study, store
         self._at: list[Sequence[str]] = []
         self.places: list[Place[Any]] = []
         kind = study.kind
-        for at, fixed, program in kind.programs(
+        for at, program in kind.programs(
             study.sweep, lambda names: partial(_read, store, names), study.allow
         ):
-            self._at.append(at)
-            self.places.append(
-                Place(
-                    scene=study.problem,
-                    fixed={**study.parameters, **fixed},
-                    program=program,
-                    keep=study.keep,
-                    resume=resume,
-                    since=since,
-                )
-            )
+            self._at.append([f"{axis} = {at.at[axis]}" for axis in study.sweep if axis in at.at])
+            own = Place(
+                scene=study.problem, fixed={**study.parameters, **at.sets}, program=program,
+                keep=study.keep, resume=resume, since=since,
+            )  # fmt: skip
+            self.places.append(own)
         self._open, self._done = set(range(len(self.places))), np.zeros(len(self.places))
         self._paths: dict[str, tuple[int, list[Any]]] = {}
         self._waits: list[set[Any]] = [set() for _ in self.places]

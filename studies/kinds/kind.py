@@ -21,19 +21,17 @@ from studies.definition.place import Chooser
 from studies.definition.points import Points
 from studies.definition.quantity import Read
 from studies.definition.schema import Context, StudyTable, parsed
-from studies.definition.sweep import Axes
+from studies.definition.sweep import Axes, Standing
 from studies.definition.vocabulary import STOPPED
 
 Reading = Callable[[Collection[str]], Callable[[Mapping[str, Any]], Read]]
 """Returns what gives some variables of a run, by its row."""
 
 
-class Placed(NamedTuple):
-    """What asks for runs, and where: texts of its place on the axes, and the parameters there."""
-
-    at: Sequence[str]
-    fixed: Mapping[str, Any]
-    chooser: Chooser
+Placed = tuple[Standing, Chooser]
+"""Where on the axes a program asks for runs, and the program."""
+EVERYWHERE = Standing({}, {})
+"""The place of a program that sets the parameters of the axes itself."""
 
 
 class Trial(NamedTuple):

@@ -59,7 +59,7 @@ def study(scene: Canned = SCENE, sweep: Any = None, **asked: Any) -> Study:
 
 def searched(seed: int, **asked: Any) -> Minimising:
     """Carry out a search whose runs end in random order."""
-    ((_, _, program),) = study(**asked).kind.programs({}, lambda names: lambda row: {}.get, [])
+    ((_, program),) = study(**asked).kind.programs({}, lambda names: lambda row: {}.get, [])
     assert isinstance(program, Minimising)
     order = random.Random(seed)
     while wants := program.wants:

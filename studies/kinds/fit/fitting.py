@@ -36,7 +36,7 @@ from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import SOLVED
 from studies.errors import Mistakes, StudyError
 from studies.kinds.fit.measured import MeasuredLine, with_files
-from studies.kinds.kind import Placed, Reading
+from studies.kinds.kind import EVERYWHERE, Placed, Reading
 from studies.kinds.ranged import DIGITS, Ends, Evaluation, Lacking, Ranged, Replayed
 
 NO_FIT = "is missing: tell what was measured, and the ranges"
@@ -130,7 +130,7 @@ class Fit(Ranged):
         """Yield the program of the fit."""
         names = {name for line in self.measured for name in (line.of, line.over)}
         names |= {named(each, by) for each in names for by in self.ranges if self.derived}
-        yield Placed([], {}, Fitting(self, standings(axes), read(names)))
+        yield EVERYWHERE, Fitting(self, standings(axes), read(names))
 
     @property
     def content(self) -> dict[str, Any]:

@@ -322,8 +322,7 @@ class Goal(Kind):
     def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
         """Yield a search for each place of the axes."""
         for each in standings(axes):
-            at = [f"{axis} = {each.at[axis]}" for axis in axes]
-            yield Placed(at, each.sets, Search(self))
+            yield each, Search(self)
 
     def longest(
         self, cases: Iterable[Case], branch: str

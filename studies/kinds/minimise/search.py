@@ -19,7 +19,7 @@ from studies.definition.schema import Whole, listed
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
 from studies.errors import StudyError
-from studies.kinds.kind import Placed, Reading
+from studies.kinds.kind import EVERYWHERE, Placed, Reading
 from studies.kinds.ranged import Evaluation, Lacking, Ranged, Replayed
 
 _RADII = {"initial_tr_radius": 0.2, "final_tr_radius": 0.01}  # of trust: shares of the ranges
@@ -69,7 +69,7 @@ class Minimise(Ranged):
 
     def programs(self, axes: Axes, read: Reading, allow: Sequence[str]) -> Iterator[Placed]:
         """Yield the searches from all starts, at all places of the axes."""
-        yield Placed([], {}, Minimising(self, standings(axes), allow))
+        yield EVERYWHERE, Minimising(self, standings(axes), allow)
 
 
 @dataclass(slots=True)

@@ -49,7 +49,7 @@ from studies.definition.schema import MAXIMUM_RUNS, Context, Whole, is_finite, l
 from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
 from studies.errors import StudyError, Unchecked
-from studies.kinds.kind import Kind, Placed, Reading
+from studies.kinds.kind import EVERYWHERE, Kind, Placed, Reading
 from studies.kinds.refine.around import Around
 from studies.kinds.refine.cells import KINK, Cell, Point, edges
 
@@ -155,7 +155,7 @@ class Refine(Kind):
             for each in standings(axes)
         }  # fmt: skip
         reading = read({each.of for each in self.of})
-        yield Placed([], {}, Refinement(self, list(branches.values()), reading, allow))
+        yield EVERYWHERE, Refinement(self, list(branches.values()), reading, allow)
 
     def longest(
         self, cases: Iterable[Case], branch: str
