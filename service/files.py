@@ -1,12 +1,15 @@
-"""Files as answers."""
+"""Files and arrays as answers."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from fastapi import HTTPException
 from fastapi.responses import FileResponse
 from starlette.datastructures import Headers
@@ -15,7 +18,7 @@ from starlette.responses import Response
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Message, Receive, Scope, Send
 
-MEDIA_TYPE = "application/netcdf"
+MEDIA_TYPE, OCTETS = "application/netcdf", "application/octet-stream"
 UNCHANGED: dict[int | str, dict[str, Any]] = {
     304: {"description": "Not modified: what the client has is up to date"}
 }
@@ -81,3 +84,18 @@ def netcdf(path: Path, name: str) -> FileResponse:
         If it cannot be read.
     """
     return PartlyFile(path, media_type=MEDIA_TYPE, filename=name, stat_result=path.stat())
+
+
+def octets(head: Mapping[str, Any], arrays: Mapping[str, np.ndarray], kind: str = "<f8") -> bytes:
+    """Return named arrays as octets: a line of JSON with what is said of them, then the numbers.
+
+    These are little endian, all of one type. The line is padded by spaces, so that the arrays begin
+    at a multiple of eight. Its entry ``arrays`` has the name, the type (``<f8`` or ``<f4``) and the
+    shape of each, in their order.
+    """
+    listed = [
+        {"name": name, "type": kind, "shape": list(values.shape)} for name, values in arrays.items()
+    ]
+    line = json.dumps(dict(head) | {"arrays": listed}, allow_nan=False).encode("ascii")
+    padded = line + b" " * (-(len(line) + 1) % 8) + b"\n"
+    return padded + b"".join(np.ascontiguousarray(each, kind).tobytes() for each in arrays.values())

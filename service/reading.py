@@ -14,7 +14,7 @@ from typing import Any
 
 import xarray as xr
 
-from service.octets import octets
+from service.files import octets
 from solver.results.mesh_fields import vtu_of
 from studies.definition.study import Study
 from studies.errors import StudyError

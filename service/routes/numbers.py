@@ -13,8 +13,7 @@ from fastapi.responses import StreamingResponse
 import solver
 from service.dependencies import TheReading, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
-from service.files import UNCHANGED, tagged, unchanged
-from service.octets import MEDIA_TYPE, octets
+from service.files import OCTETS, UNCHANGED, octets, tagged, unchanged
 from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from service.table import OUTCOMES
 from solver.late import Late
@@ -30,8 +29,8 @@ MISSING = "table.parquet needs pyarrow on the service: pip install residua-conta
 
 OUTLINED, VALUES = Late("service.reading:outlined"), Late("service.reading:values")
 
-OCTETS: dict[int | str, dict[str, Any]] = {
-    200: {"content": {MEDIA_TYPE: {}}, "description": "A line of JSON, then the numbers"},
+ARRAYS: dict[int | str, dict[str, Any]] = {
+    200: {"content": {OCTETS: {}}, "description": "A line of JSON, then the numbers"},
 }
 
 
@@ -78,7 +77,7 @@ async def table(
     return StreamingResponse(pieces, media_type=form.media_type, headers=named)
 
 
-@router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**OCTETS, **REFUSED})
+@router.get("/studies/{study_id}/numbers", tags=["studies"], responses={**ARRAYS, **REFUSED})
 async def numbers(
     study_id: ContentId,
     which: Annotated[NumbersFilter, Query()],
@@ -93,7 +92,7 @@ async def numbers(
     """
     found = await tables.get(study_id, reading)
     content = await reading.here(_numbers, found, which)
-    return Response(content, media_type=MEDIA_TYPE)
+    return Response(content, media_type=OCTETS)
 
 
 def _numbers(found: RunTable, which: NumbersFilter) -> bytes:
@@ -155,7 +154,7 @@ async def fields(
     tags=["runs"],
     responses={200: {"content": {FORMS["csv"].media_type: {}}}, **UNCHANGED, **REFUSED},
 )
-@router.get("/runs/{run_id}/values", tags=["runs"], responses={**OCTETS, **UNCHANGED, **REFUSED})
+@router.get("/runs/{run_id}/values", tags=["runs"], responses={**ARRAYS, **UNCHANGED, **REFUSED})
 async def values(
     run: TheRun,
     store: TheStore,
@@ -181,6 +180,6 @@ async def values(
         return known
     found = await reading.read(VALUES, files, field, component, stage, table)
     if not table:
-        return Response(found, media_type=MEDIA_TYPE, headers=dict(headers))
+        return Response(found, media_type=OCTETS, headers=dict(headers))
     named = {"content-disposition": f'attachment; filename="{field}.csv"'}
     return Response(found, media_type=FORMS["csv"].media_type, headers={**headers, **named})

@@ -33,10 +33,9 @@ from service.dependencies import (
 )
 from service.errors import REFUSED, Busy, Conflict, NotFound, QueueLost
 from service.examiner import examine
-from service.files import NETCDF, UNCHANGED, netcdf, tagged, unchanged
+from service.files import NETCDF, OCTETS, UNCHANGED, netcdf, tagged, unchanged
 from service.maps import PICTURE
 from service.middleware import StrictRoute
-from service.octets import MEDIA_TYPE
 from service.schemas import (
     ContentId,
     PlotQuery,
@@ -288,7 +287,7 @@ async def dataset(
 
 
 @router.get(
-    "/{study_id}/zarr/{key:path}", responses={200: {"content": {MEDIA_TYPE: {}}}, **UNCHANGED}
+    "/{study_id}/zarr/{key:path}", responses={200: {"content": {OCTETS: {}}}, **UNCHANGED}
 )
 async def tile(
     job: TheJob,
@@ -319,7 +318,7 @@ async def tile(
         raise Busy(gone) from None
     if content is None:
         raise NotFound("nothing is stored under this key")
-    kind = "application/json" if key.endswith(METADATA) else MEDIA_TYPE
+    kind = "application/json" if key.endswith(METADATA) else OCTETS
     return Response(content, media_type=kind, headers=dict(headers))
 
 

@@ -24,7 +24,7 @@ from studies import (
     predict,
 )
 from studies.execution.asking import Asking
-from studies.kinds.refine.around import between
+from studies.kinds.refine.cells import between
 from studies.kinds.refine.cells import weights
 from studies.kinds.refine.refinement import Refine, Refinement, Wanted
 from tests.studies.conftest import results_of

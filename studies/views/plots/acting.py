@@ -19,7 +19,7 @@ from solver.model.loads import Load
 from solver.model.rigid import Pushed, RigidBody
 from studies.numbers import typeset_number
 from studies.views.columns import words
-from studies.views.plots.meshed import Array
+from studies.views.plots.mapped import Array
 
 _FORCE, _MOTION, _FIELD, _HELD = "#c2410c", "#15803d", "#b45309", "0.15"
 _ARROW = 0.38

@@ -34,7 +34,7 @@ from studies.views.columns import words
 from studies.views.plots.acting import acting, draw_acting, draw_supports, outward
 from studies.views.plots.captions import capitalised, named, wrapped
 from studies.views.plots.fields import Window, empty_window
-from studies.views.plots.meshed import Array, Box
+from studies.views.plots.mapped import Array, Box
 from studies.views.plots.sheets import STYLES
 
 _PANEL, _LEGEND = (4.4, 5.4), 3.3
