@@ -21,7 +21,7 @@ from service.access import Gate
 from service.connections import limited
 from service.datasets import Datasets
 from service.errors import QueueLost
-from service.inspector import Inspector
+from service.examiner import Inspector
 from service.jobs import Jobs
 from service.keys import Keys, KeysError
 from service.maps import Pictures
@@ -38,7 +38,7 @@ from service.routes.itself import ASSETS
 from service.runner import Runner
 from service.sandbox import READERS
 from service.settings import Settings, chosen
-from service.table import Tables
+from service.overview import Tables
 from service.turns import COMBINING, COMPUTING, READING, Turns
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, StudyError
 from studies.scratch import remove_left

@@ -11,7 +11,7 @@ from fastapi import Depends, Request
 
 from service.datasets import Datasets
 from service.errors import NotFound
-from service.inspector import Inspector
+from service.examiner import Inspector
 from service.job import Job
 from service.jobs import Jobs
 from service.keys import Keys, Scope
@@ -22,7 +22,7 @@ from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
-from service.table import Tables
+from service.overview import Tables
 from service.turns import Share
 from studies.storage.store import Store
 

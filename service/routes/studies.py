@@ -286,9 +286,7 @@ async def dataset(
     return netcdf(await datasets.current(job, reading, combining), f"{job.name}.nc")
 
 
-@router.get(
-    "/{study_id}/zarr/{key:path}", responses={200: {"content": {OCTETS: {}}}, **UNCHANGED}
-)
+@router.get("/{study_id}/zarr/{key:path}", responses={200: {"content": {OCTETS: {}}}, **UNCHANGED})
 async def tile(
     job: TheJob,
     datasets: TheDatasets,

@@ -27,7 +27,7 @@ from service import datasets
 from service import turns as turning
 from service.app import create_app
 from service.errors import Busy, TooMany
-from service.inspector import Inspector
+from service.examiner import Inspector
 from service.keys import Keys, Scope
 from service.pages import new
 from service.pages import routes as pages

@@ -24,8 +24,7 @@ from studies import (
     predict,
 )
 from studies.execution.asking import Asking
-from studies.kinds.refine.cells import between
-from studies.kinds.refine.cells import weights
+from studies.kinds.refine.cells import between, weights
 from studies.kinds.refine.refinement import Refine, Refinement, Wanted
 from tests.studies.conftest import results_of
 from tests.studies.fakes import FAKE, Canned, FakeParameters, bare, record

@@ -50,8 +50,7 @@ from studies.definition.sweep import Axes, standings
 from studies.definition.vocabulary import OK, taken
 from studies.errors import StudyError, Unchecked
 from studies.kinds.kind import EVERYWHERE, Kind, Placed, Reading
-from studies.kinds.refine.cells import Around
-from studies.kinds.refine.cells import KINK, Cell, Point, edges
+from studies.kinds.refine.cells import KINK, Around, Cell, Point, edges
 
 STATES = SETTLED, FAILED, SMALLEST, MOST, OPEN = "settled", "failed", "smallest", "most", "open"
 """What became of a cell: its runs are as foreseen; all failed; it would be divided, but is as small

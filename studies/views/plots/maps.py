@@ -35,8 +35,17 @@ from studies.views.plots.fields import (
     map_axes,
     usual_field,
 )
-from studies.views.plots.mapped import STAGE, STATUS, Mapped, is_patch, mapped
-from studies.views.plots.mapped import Box, MappedMesh, mesh_maps, on_mesh
+from studies.views.plots.mapped import (
+    STAGE,
+    STATUS,
+    Box,
+    Mapped,
+    MappedMesh,
+    is_patch,
+    mapped,
+    mesh_maps,
+    on_mesh,
+)
 from studies.views.rules import SEQUENTIAL, SIGNED
 
 _SHEAR, _SLIP = "patch_shear", "patch_slip"

@@ -36,9 +36,8 @@ from studies.views.plots.fields import (
     usual_field,
 )
 from studies.views.plots.lines import line_figure
-from studies.views.plots.mapped import STAGE
+from studies.views.plots.mapped import MESH_MAPS, STAGE, mesh_maps
 from studies.views.plots.maps import map_figure
-from studies.views.plots.mapped import MESH_MAPS, mesh_maps
 from studies.views.plots.runs import number_over
 from studies.views.plots.sheets import png, resolved
 from studies.views.plots.sweep import sweep_figure

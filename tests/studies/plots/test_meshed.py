@@ -14,8 +14,8 @@ from solver.results.mesh_fields import MeshFields
 from studies import StudyError
 from studies.storage import ugrid
 from studies.views.plots.captions import symbol
-from studies.views.plots.maps import map_figure
 from studies.views.plots.mapped import mesh_maps, on_mesh
+from studies.views.plots.maps import map_figure
 from studies.views.plots.picture import picture
 from studies.views.shown import outline, shown
 from tests.studies.plots.test_many import check_inside
