@@ -27,7 +27,7 @@ from service.keys import Keys, KeysError
 from service.maps import Pictures
 from service.metrics import Metrics, Probe
 from service.middleware import SecurityHeaders, body_limit, head_is_get
-from service.overview import Details
+from service.overview import Details, Tables
 from service.pages import new
 from service.pages import routes as pages
 from service.pool import Pool
@@ -38,7 +38,6 @@ from service.routes.itself import ASSETS
 from service.runner import Runner
 from service.sandbox import READERS
 from service.settings import Settings, chosen
-from service.overview import Tables
 from service.turns import COMBINING, COMPUTING, READING, Turns
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull, StudyError
 from studies.scratch import remove_left

@@ -17,12 +17,11 @@ from service.jobs import Jobs
 from service.keys import Keys, Scope
 from service.maps import Drawing, Pictures
 from service.metrics import Metrics, Probe
-from service.overview import Details
+from service.overview import Details, Tables
 from service.retention import Keeper
 from service.runner import Runner
 from service.schemas import ContentId
 from service.settings import Settings
-from service.overview import Tables
 from service.turns import Share
 from studies.storage.store import Store
 

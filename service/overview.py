@@ -25,15 +25,15 @@ from service.schemas import StudyDetail, StudyRun, StudySummary, Window
 from service.turns import Share
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
-from studies.storage.dataset import axis_attributes
-from studies.views.figures import group_of
-from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_of
 from studies.definition.sweep import labels, linked_values, positions
 from studies.definition.vocabulary import STATUSES, taken
 from studies.kinds import KINDS, kind_of
 from studies.numbers import number_text
+from studies.storage.dataset import axis_attributes
 from studies.storage.seal import state_of
 from studies.storage.store import Store
+from studies.views.figures import group_of
+from studies.views.table import MESSAGE, RUN, STATUS, Column, RunTable, column_of
 
 KEPT = 100
 """Largest number of answers that are kept."""

@@ -35,17 +35,9 @@ from service.dependencies import (
 from service.errors import Busy, NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
-from service.pages import study as chosen
+from service.pages import shown
 from service.pages.assets import asset
 from service.pages.rendering import COOKIE, ROOT, PageRoute, page, to_study
-from service.pages.run import (
-    MOST,
-    audited,
-    compared,
-    numbers_of,
-    numbers_shown,
-    parameters_shown,
-)
 from service.routes.itself import health
 from service.routes.numbers import OUTLINED
 from service.scenes import scene_name, scene_of
@@ -171,25 +163,25 @@ def _study(
     query = dict(request.query_params)
     kind = kind_of(study)
     entry = study.get(kind.name, {})
-    numbers = [each.name for each in chosen.usual(table)]
+    numbers = [each.name for each in shown.usual(table)]
     number = query.get("number", "")
     if number not in numbers:
         asked = entry.get("of", "")
         number = asked if asked in numbers else next(iter(numbers), "")
-    at = chosen.chosen_run(table, query.get("run", ""), number)
+    at = shown.chosen_run(table, query.get("run", ""), number)
 
     def turn(**other: Any) -> str:
         kept = {k: v for k, v in {**query, **other}.items() if v not in ("", None)}
         return "?" + urlencode(kept)
 
-    part, floors = chosen.part(table, query), chosen.floors_of(table)
+    part, floors = shown.part(table, query), shown.floors_of(table)
     run = None
     if at is not None:
         run = {
             "id": table.columns[RUN].values[at],
             "status": table.columns[STATUS].values[at],
             "message": table.columns[MESSAGE].values[at],
-            "at": [(each, chosen.cell_text(each, at, floors)) for each in varied(table)],
+            "at": [(each, shown.cell_text(each, at, floors)) for each in varied(table)],
         }
     csv = urlencode({**part.where, **({"sort": part.sort} if part.sort else {})})
     return page(
@@ -199,7 +191,7 @@ def _study(
         scene_name=scene.name if scene else study["scene"],
         table=table,
         part=part,
-        cell=partial(chosen.cell_text, floors=floors),
+        cell=partial(shown.cell_text, floors=floors),
         number=number,
         chosen=run,
         turn=turn,
@@ -215,7 +207,7 @@ def _study(
             "number": number,
             "run": run["id"] if run else None,
             "at": at,
-            **chosen.described(table),
+            **shown.described(table),
         },
     )
 
@@ -231,14 +223,14 @@ def _run(
     request: Request, run: Mapping[str, Any], store: Store, drawn: Mapping[str, Any]
 ) -> Response:
     scene = _scene_of_run(store, run["scene"])
-    numbers = numbers_of([run], scene)
+    numbers = shown.numbers_of([run], scene)
     return page(
         request,
         "run",
         run=run,
-        parameters=parameters_shown(run, scene),
-        audit=audited(numbers),
-        numbers=numbers_shown(numbers),
+        parameters=shown.parameters_shown(run, scene),
+        audit=shown.audited(numbers),
+        numbers=shown.numbers_shown(numbers),
         elasticities=elasticities(run["scalars"], run["parameters"]),
         drawn=drawn,
         data={"run": run["id"], "fields": drawn},
@@ -260,8 +252,8 @@ def compare_page(
 ) -> Response:
     """Show what differs between runs."""
     ids = list(dict.fromkeys(run or []))
-    if len(ids) > MOST:
-        raise StudyError("run", f"{len(ids)} runs", f"at most {MOST} runs are compared")
+    if len(ids) > shown.MOST:
+        raise StudyError("run", f"{len(ids)} runs", f"at most {shown.MOST} runs are compared")
     rows = []
     for each in ids:
         row = store.run(each) if is_id(each) else None
@@ -269,7 +261,7 @@ def compare_page(
             raise NotFound(f"no run has the id {each[:40]}")
         rows.append(row)
     scene = _scene_of_run(store, rows[0]["scene"]) if rows else None
-    found = compared(rows, scene)
+    found = shown.compared(rows, scene)
     return page(request, "compare", rows=rows, found=found, data={"runs": ids})
 
 

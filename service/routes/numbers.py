@@ -14,8 +14,8 @@ import solver
 from service.dependencies import TheReading, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
 from service.files import OCTETS, UNCHANGED, octets, tagged, unchanged
-from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from service.overview import OUTCOMES
+from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
 from solver.late import Late
 from studies.errors import StudyError
 from studies.storage.seal import digest

@@ -17,8 +17,7 @@ from service.errors import NotFound
 from service.job import Job, StudyState
 from service.jobs import Jobs
 from service.overview import KEPT, Detail, Details
-from service.pages.run import numbers_of, numbers_shown, parameters_shown
-from service.pages.study import cell_text, floors_of
+from service.pages.shown import cell_text, floors_of, numbers_of, numbers_shown, parameters_shown
 from service.schemas import StudyDetail, Window
 from service.turns import Share, Turns
 from studies import Store

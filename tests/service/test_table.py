@@ -22,7 +22,7 @@ from service.app import create_app
 from service.errors import NotFound
 from service.jobs import Jobs
 from service.pages.form import as_toml, study_of
-from service.pages.run import audited, numbers_of
+from service.pages.shown import audited, numbers_of
 from service.settings import Settings
 from service.turns import Share
 from studies import Store, open_netcdf, open_study
