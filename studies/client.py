@@ -26,8 +26,9 @@ from studies.definition.vocabulary import OK
 from studies.errors import MOST_NAMES, StudyError
 from studies.scenes.file_scene import FileScene
 from studies.toml import toml_file
+from studies.views.columns import placed
 from studies.views.figures import Worst
-from studies.views.summary import Failed, Summary, bar, placed, summary_of
+from studies.views.summary import Failed, Summary, bar, summary_of
 
 if TYPE_CHECKING:
     import xarray as xr

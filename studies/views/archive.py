@@ -17,16 +17,16 @@ from studies.errors import StudyError
 from studies.numbers import number_text
 from studies.scenes.registry import known_names, scene_named
 from studies.storage.dataset import attributes_of
-from studies.views.columns import meaning_of, unit_of, unit_text, value_text, with_unit
+from studies.views.columns import meaning_of, placed, unit_of, unit_text, value_text, with_unit
 from studies.views.figures import FIGURES, group_of, meter, varies, worst
 from studies.views.html import templates
-from studies.views.picking import one_run, sweep_axes, sweep_coordinates
+from studies.views.picking import one_run, over_runs, sweep_axes, varied
 from studies.views.plots.fields import line_fields, map_fields, sweep_fields, usual_field
 from studies.views.plots.lines import line_figure
 from studies.views.plots.maps import map_figure
 from studies.views.plots.sheets import png
 from studies.views.plots.sweep import sweep_figure
-from studies.views.summary import placed, values_text
+from studies.views.summary import values_text
 from studies.views.tables import (
     BY_ACCURACY,
     FOOTNOTE,
@@ -113,7 +113,7 @@ def _summary(scene: str, size: int) -> str:
 
 def _varied(dataset: xr.Dataset) -> list[str]:
     """Return the coordinates that differ between runs, without the numbers of points."""
-    names = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
+    names = varied(dataset)
     numbered = {axis for name, axis in names.items() if name != axis}
     return [n for n in names if n not in numbered or dataset[n].dtype.kind not in "iuf"]
 
@@ -196,16 +196,14 @@ def _is_main(name: str) -> bool:
 
 def _audit(dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
     """Yield the largest value of each figure of the audit, its limit, and its run."""
-    status = dataset["status"]
-    numbers = {str(n): v.to_numpy() for n, v in dataset.data_vars.items() if v.dims == status.dims}
-    for each in worst(numbers):
+    for each in worst({name: each.to_numpy() for name, each in over_runs(dataset).items()}):
         yield {
             "name": each.name,
             "words": str(attributes_of(each.name).get("long_name", each.name)),
             "value": value_text(each.value),
             "limit": value_text(each.limit),
             "percent": round(100.0 * meter(each.value, each.limit), 1),
-            "place": place_of(dataset, np.unravel_index(each.at, status.shape)),
+            "place": place_of(dataset, np.unravel_index(each.at, dataset["status"].shape)),
         }
 
 

@@ -12,7 +12,7 @@ from studies.definition.vocabulary import OK
 from studies.errors import StudyError
 from studies.views.columns import in_blocks, meaning_of, stacked, unit_of, value_text, with_unit
 from studies.views.figures import group_of
-from studies.views.picking import flags, sweep_axes, sweep_coordinates
+from studies.views.picking import flags, sweep_axes, sweep_coordinates, varied
 from studies.views.plots.fields import sweep_fields, wide_fields
 from studies.views.table import STATUS, Column, RunTable, one_number
 
@@ -95,11 +95,11 @@ def best_runs(
     numbers = dataset[of].to_numpy()[tuple(places.T)]
     order = np.argsort(numbers if lowest else -numbers, kind="stable")[:count]
     axes = sweep_axes(dataset)
-    varied = {n: a for n, a in sweep_coordinates(dataset).items() if dataset.sizes[a] > 1}
+    there = varied(dataset)
     found = []
     for at in order:
         place = dict(zip(axes, places[at], strict=True))
-        run = {name: dataset[name].to_numpy()[place[axis]] for name, axis in varied.items()}
+        run = {name: dataset[name].to_numpy()[place[axis]] for name, axis in there.items()}
         found.append({name: each.item() for name, each in run.items()} | {of: numbers[at].item()})
     return found
 

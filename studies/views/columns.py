@@ -6,7 +6,7 @@ import json
 import math
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -64,6 +64,11 @@ def meaning_of(variable: Any) -> str:
 def with_unit(text: str, unit: str) -> str:
     """Return a text with a unit behind it, if there is one: ``pressure [MPa]``."""
     return f"{text} [{unit}]".lstrip() if unit else text
+
+
+def placed(place: Mapping[str, Any]) -> str:
+    """Return the place of a run in words."""
+    return ", ".join(f"{name} = {value_text(value)}" for name, value in place.items())
 
 
 def counted(value: Any) -> str:

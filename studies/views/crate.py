@@ -34,7 +34,7 @@ from studies.storage import runfile, seal
 from studies.storage.provenance import NONE
 from studies.storage.ran import PROGRAM, files_of, meshes_of
 from studies.storage.store import Store
-from studies.views.columns import value_text
+from studies.views.columns import placed
 from studies.views.differing import diff, difference_table
 from studies.views.picking import study_of
 from studies.views.reading import find_study, one_error, open_netcdf
@@ -273,8 +273,8 @@ class _Writer:
             self._copy(self.store.run_path(run_id), name, words, exampleOfWork=_to("#run"))
             action = _action(run_id, attrs, *said[run_id])
             parameters = json.loads(attrs["parameters"])
-            at = (f"{name} = {value_text(parameters[name])}" for name in self.varied)
-            action["description"] = ", ".join(at) or "the run of the study"
+            at = placed({name: parameters[name] for name in self.varied})
+            action["description"] = at or "the run of the study"
             action["instrument"] = _to(quote(study))
             action["object"] = [_to(quote(each)) for each in given]
             action["object"] += [_to(each) for each in values[run_id]]

@@ -17,7 +17,7 @@ from studies.definition.vocabulary import MISSING, SOLVED
 from studies.errors import StudyError, one_of
 from studies.numbers import number_text
 from studies.toml import CASE
-from studies.views.columns import aligned, unit_text, value_text
+from studies.views.columns import aligned, placed, unit_text
 from studies.views.picking import flags, own_grid, sweep_axes, sweep_coordinates
 
 _NOT_COMPARED = ("cpu_seconds", "round")
@@ -181,8 +181,7 @@ def difference_table(found: Difference) -> str:
     told = [f"{_at(at)}: {before} -> {after}" for at, before, after in found.statuses]
     lines += _listed("with another status", told)
     if found.unknown:
-        values = (f"{name} = {value_text(value)}" for name, value in found.unknown.items())
-        lines.append(f"parameters that only one has: {', '.join(values)}")
+        lines.append(f"parameters that only one has: {placed(found.unknown)}")
     lines += [f"{name} is not compared: {why}" for name, why in found.unlike.items()]
     if not found.changes:
         return "\n".join([*lines, "no value differs"])
@@ -213,7 +212,7 @@ def _listed(what: str, runs: Sequence[str]) -> list[str]:
 
 
 def _at(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} = {value_text(value)}" for name, value in values.items()) or "the run"
+    return placed(values) or "the run"
 
 
 def _name(dataset: xr.Dataset) -> str:

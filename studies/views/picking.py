@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,12 @@ def sweep_axes(dataset: xr.Dataset) -> list[str]:
     return [str(name) for name in dataset["status"].dims]
 
 
+def over_runs(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Return the variables of a data set that have one value for each run."""
+    axes = tuple(sweep_axes(dataset))
+    return {str(name): each for name, each in dataset.data_vars.items() if each.dims == axes}
+
+
 def only_numbers(dataset: xr.Dataset, *but: str) -> xr.Dataset:
     """Return a data set without other lines and maps: to stack its runs reads all that it has."""
     axes = {*sweep_axes(dataset)}
@@ -67,6 +73,22 @@ def sweep_coordinates(dataset: xr.Dataset) -> dict[str, str]:
         for name, each in dataset.coords.items()
         if each.dims == (axis,)
     }
+
+
+def varied(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the coordinates that differ between runs, each with its sweep dimension."""
+    return {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
+
+
+def each_run(
+    dataset: xr.Dataset, coordinates: Mapping[str, str]
+) -> Iterator[tuple[tuple[int, ...], dict[str, Any]]]:
+    """Yield the position of each run, and its values of coordinates, given with their axes."""
+    axes = sweep_axes(dataset)
+    values = {name: dataset[name].to_numpy() for name in coordinates}
+    for at in np.ndindex(dataset["status"].shape):
+        place = dict(zip(axes, at, strict=True))
+        yield at, {name: values[name][place[axis]] for name, axis in coordinates.items()}
 
 
 def select(dataset: xr.Dataset, selection: Mapping[str, str | float]) -> xr.Dataset:

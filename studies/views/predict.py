@@ -24,6 +24,7 @@ from studies.views.fits import by_content, check_predicted, share_predicted
 from studies.views.gaussian import Array, Gaussian, in_hull
 from studies.views.picking import (
     only_numbers,
+    over_runs,
     positions,
     select,
     sweep_axes,
@@ -119,7 +120,7 @@ def _names(dataset: xr.Dataset, of: str | Sequence[str] | None) -> list[str]:
     axes = tuple(sweep_axes(dataset))
     every = {str(name): each for name, each in dataset.data_vars.items()}
     floats = [n for n, v in every.items() if v.dtype.kind == "f" and v.dims[: len(axes)] == axes]
-    numbers = [name for name in floats if every[name].dims == axes]
+    numbers = [name for name in over_runs(dataset) if name in floats]
     refined = [name.removeprefix(ERROR) for name in every if name.startswith(ERROR)]
     names = [of] if isinstance(of, str) else list(of or refined or numbers)
     for name in names:
@@ -332,12 +333,7 @@ def answer(
     if not study.kind.of_runs:
         allowed = "has what a search found, not runs: predict tells numbers of runs"
         raise StudyError("study", study.name, allowed)
-    axes = sweep_axes(dataset)
-    numbers = [
-        str(name)
-        for name, each in dataset.data_vars.items()
-        if each.dtype.kind == "f" and each.dims == tuple(axes)
-    ]
+    numbers = [name for name, each in over_runs(dataset).items() if each.dtype.kind == "f"]
     if of not in numbers:
         raise StudyError("of", of, one_number(of, numbers, wide_fields(dataset)))
     if within is not None and not (is_number(within) and within >= 0.0):

@@ -252,8 +252,12 @@ def _of_library(method: str, places: Numbers, values: Numbers) -> xr.Dataset:
 
 def main_index(found: xr.Dataset) -> str:
     """Return the index by which parameters are ordered: the total one, or the first of a method."""
-    own = (str(name) for name, each in found.data_vars.items() if each.dims == ("parameter",))
-    return "total" if "total" in found else next(own)
+    return "total" if "total" in found else _each_parameter(found)[0]
+
+
+def _each_parameter(found: xr.Dataset) -> list[str]:
+    """Return the variables with a value for each parameter."""
+    return [str(name) for name, each in found.data_vars.items() if each.dims == ("parameter",)]
 
 
 def ordered(found: xr.Dataset) -> list[int]:
@@ -264,8 +268,7 @@ def ordered(found: xr.Dataset) -> list[int]:
 def sensitivity_table(found: xr.Dataset) -> str:
     """Return a line for each parameter, that of the largest index first, and how sure it is."""
     chaos = found.attrs["method"] == "chaos"
-    columns = [str(name) for name, each in found.data_vars.items() if each.dims == ("parameter",)]
-    columns = [name for name in columns if name != "units" and not name.endswith("_error")]
+    columns = [n for n in _each_parameter(found) if n != "units" and not n.endswith("_error")]
     lines = [["parameter", *columns]]
     for k in ordered(found):
         one = found.isel(parameter=k)
@@ -287,7 +290,7 @@ def sensitivity_table(found: xr.Dataset) -> str:
 
 def told(found: xr.Dataset) -> dict[str, Any]:
     """Return the indices as JSON has them: by parameter, and what is told of the fit."""
-    names = [str(n) for n, each in found.data_vars.items() if each.dims == ("parameter",)]
+    names = _each_parameter(found)
     rows = {
         str(one["parameter"].item()): {name: or_none(one[name].item()) for name in names}
         for one in (found.isel(parameter=k) for k in range(found.sizes["parameter"]))

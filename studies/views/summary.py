@@ -118,11 +118,6 @@ def _called(name: str, known: str) -> str:
     return name if name == known else f"{name} ({known[:8]}…)".lstrip()
 
 
-def placed(place: Mapping[str, Any]) -> str:
-    """Return the place of a run in words."""
-    return ", ".join(f"{name} = {value_text(value)}" for name, value in place.items())
-
-
 def bar(fraction: float) -> str:
     """Return a bar with its percentage."""
     filled = round(WIDTH * fraction)

@@ -30,15 +30,16 @@ from studies.views.columns import (
     computed_text,
     in_blocks,
     or_none,
+    placed,
     stacked,
     unit_of,
     value_text,
     with_unit,
 )
 from studies.views.figures import FIGURES, Floors, derived, elasticities, worst
-from studies.views.picking import flags, sweep_axes, sweep_coordinates
+from studies.views.picking import each_run, flags, over_runs, sweep_axes, sweep_coordinates, varied
 from studies.views.reading import open_study
-from studies.views.summary import NAMED, Failed, Summary, placed, values_text
+from studies.views.summary import NAMED, Failed, Summary, values_text
 
 LISTED = 100
 """Largest number of runs that a report lists; `residua show` prints all."""
@@ -89,7 +90,7 @@ def runs_table(dataset: xr.Dataset) -> str:
 
 def run_cells(dataset: xr.Dataset) -> RunCells:
     """Return the texts of `runs_table`."""
-    places = {n: axis for n, axis in sweep_coordinates(dataset).items() if dataset.sizes[axis] > 1}
+    places = varied(dataset)
     keys = sum(name == axis for name, axis in places.items())
     figures = list(_figures(dataset))
     headings = [
@@ -99,14 +100,13 @@ def run_cells(dataset: xr.Dataset) -> RunCells:
     ]
     units: list[str] = [unit_of(dataset[name]) for name in places]
     units += ["", *(unit_of(each) for _, each, _ in figures)]
-    values = {name: dataset[name].to_numpy() for name in (*places, "status")}
+    status = dataset["status"].to_numpy()
     floors = _floors(each for _, each, _ in figures)
     cells = [_cells(_clean(each, floors), spoiled) for _, each, spoiled in figures]
     rows: list[list[str]] = []
-    for at in np.ndindex(values["status"].shape):
-        place = dict(zip(sweep_axes(dataset), at, strict=True))
-        where = [value_text(values[name][place[axis]]) for name, axis in places.items()]
-        rows.append([*where, str(values["status"][at]), *(str(each[at]) for each in cells)])
+    for at, place in each_run(dataset, places):
+        where = map(value_text, place.values())
+        rows.append([*where, str(status[at]), *(str(each[at]) for each in cells)])
     marked = any(bool(spoiled.any()) for *_, spoiled in figures)
     return RunCells(headings, units, rows, keys, len(places) + 1, marked)
 
@@ -175,12 +175,11 @@ def _spoiled(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 def _own(dataset: xr.Dataset) -> list[str]:
     """Return the outputs that a scene file declares, without places of extremes and derivatives."""
-    rank = dataset["status"].dims
-    numbers = {str(n): v for n, v in dataset.data_vars.items() if v.dtype.kind in "fiub"}
-    names = [name for name, each in numbers.items() if each.dims == rank]
+    every = over_runs(dataset)
+    names = [name for name, each in every.items() if each.dtype.kind in "fiub"]
     known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
     parameters = [*_parameters(dataset), *map(str, dataset.coords)]
-    known |= {named(*each) for each in derived(_numbers(dataset), parameters)}
+    known |= {named(*each) for each in derived(every, parameters)}
     known |= {*map(reach, parameters)}
     own = [name for name in names if name not in known and not name.startswith(_AUDIT)]
     ends = {f"_{axis}" for axis in AXES}
@@ -192,17 +191,14 @@ def messages(dataset: xr.Dataset) -> str:
 
     Messages that differ only in numbers are of one kind; the ranges of the numbers are shown.
     """
-    axes = [axis for axis in sweep_axes(dataset) if dataset.sizes[axis] > 1]
     status, text = (dataset[name].to_numpy() for name in ("status", "message"))
     found: dict[tuple[str, str], list[tuple[list[str], str]]] = defaultdict(list)
     for at in np.ndindex(status.shape):
-        place = dict(zip(sweep_axes(dataset), at, strict=True))
-        where = (f"{axis} = {value_text(dataset[axis].to_numpy()[place[axis]])}" for axis in axes)
         if text[at]:
             outcome = str(status[at])
             kind = "warning" if outcome == OK else outcome
             words = _NUMBER.sub("\0", str(text[at]))
-            found[kind, words].append((_NUMBER.findall(str(text[at])), ", ".join(where)))
+            found[kind, words].append((_NUMBER.findall(str(text[at])), place_of(dataset, at)))
     return "".join(
         f"\n{kind}: {_ranged(words, [numbers for numbers, _ in runs])}\n"
         f"    {_listed([where for _, where in runs])}\n"
@@ -306,13 +302,9 @@ def _runs(
 ) -> Iterator[dict[str, Any]]:
     """Yield the parameters of each run."""
     swept = {n: axis for n, axis in sweep_coordinates(dataset).items() if n in known}
-    values = {
-        name: [plain(or_none(each), known[name].default) for each in dataset[name].to_numpy()]
-        for name in swept
-    }
-    for at in np.ndindex(dataset["status"].shape):
-        place = dict(zip(sweep_axes(dataset), at, strict=True))
-        yield given | {name: values[name][place[axis]] for name, axis in swept.items()}
+    for _, place in each_run(dataset, swept):
+        own = {n: plain(or_none(each), known[n].default) for n, each in place.items()}
+        yield given | own
 
 
 def _range_text(numbers: list[Any]) -> str:
@@ -333,7 +325,7 @@ def summary(study: xr.Dataset | Path | str) -> Summary:
             return summary(opened)
     names = sweep_axes(study)
     status, message = (study[name].to_numpy() for name in ("status", "message"))
-    numbers = {str(n): v.to_numpy() for n, v in study.data_vars.items() if v.dims == (*names,)}
+    numbers = {name: each.to_numpy() for name, each in over_runs(study).items()}
     first = next(iter(worst(numbers)), None)
     words, count = np.unique(status.astype(str), return_counts=True)
     lost = [at for at in np.ndindex(status.shape) if status[at] not in (OK, MISSING)]
@@ -362,11 +354,6 @@ def place_of(dataset: xr.Dataset, at: Sequence[SupportsIndex]) -> str:
     return placed({name: dataset[name].to_numpy()[k] for name, k in several})
 
 
-def _numbers(runs: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the variables of the runs that have one value for each."""
-    return {str(name): runs[name] for name in runs if runs[name].dims == runs["status"].dims}
-
-
 def elasticity_table(runs: xr.Dataset) -> str:
     """Return the elasticities of the runs of a study as text; empty if there are none.
 
@@ -374,7 +361,7 @@ def elasticity_table(runs: xr.Dataset) -> str:
     """
     cells: dict[str, dict[str, str]] = {}
     swept = {str(name): each for name, each in runs.coords.items()}
-    for of, row in elasticities(_numbers(runs), {**_parameters(runs), **swept}).items():
+    for of, row in elasticities(over_runs(runs), {**_parameters(runs), **swept}).items():
         for by, known in row.items():
             least, median, most = np.quantile(known, [0.0, 0.5, 1.0])
             span = f" ({least:+.2f} to {most:+.2f})" if known.size > 1 else ""

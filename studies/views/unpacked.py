@@ -22,7 +22,7 @@ from studies.storage import seal
 from studies.storage.frame import SETS
 from studies.storage.store import Store
 from studies.views.columns import or_none
-from studies.views.picking import own_grid
+from studies.views.picking import over_runs, own_grid
 from studies.views.reading import check, indexed, one_error
 
 _TEXTS = ("status", "message")
@@ -108,7 +108,7 @@ class Unpacked(Store):
     def _rows(self, dataset: xr.Dataset) -> Iterator[dict[str, Any]]:
         """Yield the rows of the runs that are there for the catalogue."""
         axes, shape = dataset["status"].dims, dataset["status"].shape
-        over = {str(n): each for n, each in dataset.data_vars.items() if each.dims == axes}
+        over = over_runs(dataset)
         numbers = {n: each.to_numpy() for n, each in over.items() if each.dtype.kind in "fiub"}
         texts = {name: over[name].to_numpy() for name in _TEXTS}
         for run_id, at in zip(self.run_ids, np.ndindex(shape), strict=True):

@@ -10,7 +10,7 @@ import xarray as xr
 
 from studies.kinds.kind import Found, Mark
 from studies.views.columns import or_none, unit_of, value_text, words
-from studies.views.picking import sweep_axes, sweep_coordinates
+from studies.views.picking import each_run, sweep_coordinates
 from studies.views.tables import run_cells
 
 
@@ -51,16 +51,12 @@ def _reached(goal: Mapping[str, Any], dataset: xr.Dataset) -> str:
 
 def _places(dataset: xr.Dataset, name: str) -> list[Mark]:
     """Return where the answers of a goal are: on the axes, and of the parameter searched."""
-    axes = sweep_coordinates(dataset)
-    at = {each: dataset[each].to_numpy() for each in axes}
     ends = [dataset[f"{name}{end}"].to_numpy() for end in ("", "_low", "_high")]
     marks: list[Mark] = []
-    for index in np.ndindex(ends[0].shape):
+    for index, at in each_run(dataset, sweep_coordinates(dataset)):
         value, low, high = (each[index].item() for each in ends)
         if np.isnan(value):
             continue
-        place = dict(zip(sweep_axes(dataset), index, strict=True))
-        own = {each: values[place[axes[each]]].item() for each, values in at.items()}
-        fixed: dict[str, tuple[Any, Any, Any]] = {k: (v, None, None) for k, v in own.items()}
+        fixed: dict[str, tuple[Any, Any, Any]] = {k: (v.item(), None, None) for k, v in at.items()}
         marks.append(fixed | {name: (value, or_none(low), or_none(high))})
     return marks

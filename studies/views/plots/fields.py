@@ -13,7 +13,7 @@ from solver.tensors import component as derived
 from studies.definition.vocabulary import SYMMETRIC
 from studies.errors import StudyError, one_of
 from studies.numbers import rounding
-from studies.views.picking import sweep_axes
+from studies.views.picking import over_runs, sweep_axes
 from studies.views.plots.captions import DISTANCE
 
 Window = Sequence[float]
@@ -43,12 +43,8 @@ DRAWN = (*AXES, *ALONG, OUTLINE)
 
 def sweep_fields(dataset: xr.Dataset) -> list[str]:
     """Return the numbers and flags with one value per run, and ``status``."""
-    sweep = tuple(sweep_axes(dataset))
-    return [
-        str(name)
-        for name, each in dataset.data_vars.items()
-        if each.dims == sweep and (each.dtype.kind in "fiu" or name == "status")
-    ]
+    every = over_runs(dataset).items()
+    return [name for name, each in every if each.dtype.kind in "fiu" or name == "status"]
 
 
 def wide_fields(dataset: xr.Dataset) -> dict[str, list[str]]:
