@@ -14,20 +14,17 @@ from http import HTTPStatus
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Form, Query, Request, Response
+from fastapi import APIRouter, Depends, Form, Query, Request, Response
 from fastapi.responses import RedirectResponse
 
 from service import overview
 from service.dependencies import (
-    TheCaller,
     TheDatasets,
     TheDetails,
     TheJobs,
     TheKeys,
-    TheProbe,
     TheReading,
     TheRun,
-    TheRunner,
     TheStore,
     TheTables,
     in_turn,
@@ -268,15 +265,12 @@ def compare_page(
 @router.get("/health")
 async def health_page(
     request: Request,
-    runner: TheRunner,
     jobs: TheJobs,
     store: TheStore,
-    probe: TheProbe,
-    caller: TheCaller,
     reading: TheReading,
+    state: Annotated[Health, Depends(health)],
 ) -> Response:
     """Show the queue and whether the service can do its work."""
-    state = await health(runner, jobs, store, probe, caller, Response())
     return await reading.here(_health, request, jobs, store, state)
 
 
