@@ -466,7 +466,7 @@ def test_keys_that_the_system_cannot_read_now_are_not_damaged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
     Keys(tmp_path).add("anna", Scope.READ)
-    for failing in ("studies.storage.seal.read_file", "studies.storage.seal._stat"):
+    for failing in ("studies.storage.seal.read_file", "studies.storage.seal.state_of"):
         with monkeypatch.context() as patch:
             patch.setattr(failing, partial(refuse, number))
             for change in (lambda keys: keys.add("bert", Scope.READ), lambda k: k.remove("anna")):

@@ -383,7 +383,8 @@ def test_a_goal_that_is_not_reached_fails_with_the_reason(service: Server) -> No
     assert (detail["status"], detail["message"]) == ("failed", "1 of 1 searches: 1 missing")
     assert detail["stage"] == "1 of 1 searches ended"
     page = service.client.get(f"/ui/studies/{detail['id']}").text
-    assert "<td>at load ratio = 1 the goal is not reached: max plastic strain = 1</td>" in page
+    ends = "max plastic strain is 0.2 at load ratio = 0.2 and 1 at load ratio = 1"
+    assert f">{ends}: it does not reach 5 in between</td>" in page
     assert '"found": []' in page
 
 
