@@ -23,12 +23,8 @@ from solver.errors import ModelError
 from solver.late import late
 from solver.model.friction import coefficient
 from solver.parameters import Fraction, Length, Ratio, Stress, described
-from solver.rolling.scenes.wheel_parameters import (
-    ROLLED,
-    PrismParameters,
-    check_given_shear,
-    rail_scene,
-)
+from solver.rolling.scenes.rail_scene import PrismParameters, rail_scene
+from solver.rolling.scenes.wheel_parameters import ROLLED, check_given_shear
 
 ELEMENTS: Mapping[str, int] = {"draft": 4, "standard": 6, "fine": 10}
 """Elements per semi-axis of the elastic Hertz contact: across, along, and in depth for the shorter

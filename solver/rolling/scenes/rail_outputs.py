@@ -20,8 +20,8 @@ from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import ShakedownState
 from solver.rolling.rail.section import Section
 from solver.rolling.scenes.passes import mean_added, passes, shakedown_of
+from solver.rolling.scenes.rail_scene import PrismParameters
 from solver.rolling.scenes.rolling_setup import CREEPAGE, LONGITUDINAL_FORCE
-from solver.rolling.scenes.wheel_parameters import PrismParameters
 from solver.scenes.scene import Advice
 from solver.scenes.sketch import Sketch
 from solver.typing import Array

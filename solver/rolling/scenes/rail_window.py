@@ -13,7 +13,7 @@ from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
-from solver.rolling.scenes.wheel_parameters import PrismParameters
+from solver.rolling.scenes.rail_scene import PrismParameters
 from solver.scenes.scene import Effort
 from solver.tensors import SQRT2
 

@@ -25,8 +25,8 @@ from solver.parts import declared
 from solver.rolling.load import RollingLoad
 from solver.rolling.rail.profiles.points import SectionMesh, as_points
 from solver.rolling.scenes.initial_stress import INITIAL_STRESS, SectionStress
+from solver.rolling.scenes.rail_scene import ROUGH, PrismParameters, rail_scene
 from solver.rolling.scenes.sequence import CUT, block_of, check_spreads, deviations
-from solver.rolling.scenes.wheel_parameters import ROUGH, PrismParameters, rail_scene
 
 ELEMENT_SIZE: Mapping[str, float] = {"draft": 2.0, "standard": 1.0, "fine": 0.5}
 """Side of the elements under the contact, across and in depth [mm]."""
