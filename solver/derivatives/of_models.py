@@ -25,8 +25,8 @@ def derive(
     """Return the derivatives of a result of a model by the numbers from which it is made.
 
     The model is solved once. Its derivatives follow increment by increment, through plastic flow,
-    contact and friction: see `solver.derivatives.neighbours`. A warning is logged if they may be
-    one-sided: see `solver.derivatives.neighbours`.
+    contact and friction. A warning is logged if they may be one-sided. See
+    `solver.derivatives.neighbours`.
 
     Parameters
     ----------

@@ -46,7 +46,10 @@ class Mechanism:
 
     @property
     def excludes(self) -> bool:
-        """Whether equilibrium is excluded from any other state: normal forces may differ there."""
+        """Whether equilibrium is excluded from any other state, as `limit`, for any history.
+
+        A slide excludes it only for its normal forces, which may differ in another state.
+        """
         return self.limit and not self.slides
 
     def __str__(self) -> str:
