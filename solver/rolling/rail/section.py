@@ -226,8 +226,7 @@ class Section:
         """
         assembly = Assembly(self.dofs, unknowns, self.n, block)
         terms = [assembly.values(slice(None), each) for each in self._elements]
-        on_block = assembly.block_values if block is not None else None
-        return Stiffness(assembly.pattern, np.stack(terms), on_block)
+        return Stiffness(assembly, np.stack(terms))
 
     def strain_matrices(
         self, elements: Ints, unknowns: Ints
@@ -292,25 +291,14 @@ class Stiffness:
     pattern : upper triangle of all K_k, values not set
     """
 
-    def __init__(
-        self,
-        pattern: sparse.csr_array,
-        terms: Array,
-        on_block: Callable[[Array], Array] | None = None,
-    ) -> None:
-        self.pattern, self._terms, self._on_block = pattern, terms, on_block
+    def __init__(self, assembly: Assembly, terms: Array) -> None:
+        self.pattern, self._assembly, self._terms = assembly.pattern, assembly, terms
 
     def at(self, k: float, taken: Array | None = None) -> Array:
-        """Return the values of K_k on the pattern, less those ``taken`` on its block [N/mm2].
-
-        ``taken`` (b, b) is on the unknowns of the block; without it nothing is taken.
-        """
+        """Return the values of K_k on the pattern, less those ``taken`` (b, b) on its block."""
         K0, K1, K2 = self._terms
         values = np.asarray(K0 + k * (K1 + k * K2))
-        if taken is None:
-            return values
-        assert self._on_block is not None
-        return values - self._on_block(taken)
+        return values if taken is None else values - self._assembly.block_values(taken)
 
     @property
     def terms(self) -> list[sparse.csr_array]:
