@@ -159,3 +159,28 @@ class SchurComplement:
             return u
 
         return Eliminated(condensed, finish)
+
+
+def with_block(
+    row: Ints, column: Ints, block: Ints, size: int
+) -> tuple[sparse.csr_array, Ints, Ints]:
+    """Return the pattern of a sparse matrix with a dense block on some unknowns, values zero.
+
+    Parameters
+    ----------
+    row, column : (n,) entries of the upper triangle (size, size)
+    block : (b,) increasing, unknowns of the block
+
+    Returns
+    -------
+    The upper triangle; the positions in its values of the entries (n,); and those of the upper
+    triangle of the block, in the order of `numpy.triu_indices`.
+    """
+    first, second = np.triu_indices(len(block))
+    rows = np.concatenate([row, block[first]])
+    keys, slot = np.unique(
+        rows * size + np.concatenate([column, block[second]]), return_inverse=True
+    )
+    indptr = np.searchsorted(keys, np.arange(size + 1) * size)
+    pattern = sparse.csr_array((np.zeros(len(keys)), keys % size, indptr), shape=(size, size))
+    return pattern, slot[: len(row)], slot[len(row) :]

@@ -29,7 +29,7 @@ from scipy import sparse
 from solver.errors import ModelError
 from solver.late import late
 from solver.linear import solvers as linear
-from solver.linear.schur import Elimination
+from solver.linear.schur import Elimination, with_block
 from solver.linear.solvers import Factors
 from solver.rolling.rail.section import I_AXIS, I_COMPONENTS, Carried, Section
 from solver.typing import Array, Bools, Ints
@@ -361,14 +361,21 @@ def _factorised(
     rest = np.setdiff1d(section.free, zone)
     coupled = np.isin(section.dofs, rest).any(axis=1)
     rim = np.intersect1d(section.dofs[coupled], zone)
-    own, outside = section.stiffness(zone, rim), section.stiffness(np.concatenate([rest, rim]))
+    own, outside = section.stiffness(zone), section.stiffness(np.concatenate([rest, rim]))
     elimination = Elimination(outside.pattern, len(rest))
-    factors = linear.analyse_several(own.pattern, len(wavenumbers))
+    first, second = np.triu_indices(len(rim))
+    place = np.searchsorted(zone, rim)
+    row, column = own.pattern.tocoo().coords
+    pattern, sparse_slot, dense_slot = with_block(row, column, place, len(zone))
+    factors = linear.analyse_several(pattern, len(wavenumbers))
     for wave, k in enumerate(wavenumbers):
-        factors.factorise(own.at(k, elimination.taken(outside.at(k))), wave)
+        data = np.zeros(pattern.nnz)
+        data[sparse_slot] = own.at(k)
+        data[dense_slot] -= elimination.taken(outside.at(k))[first, second]
+        factors.factorise(data, wave)
         if wave == 0:
             reactions = section.sprung[zone]
             condensed = elimination.forward(section.sprung[np.concatenate([rest, rim])])
-            reactions[np.searchsorted(zone, rim)] = condensed[len(rest) :]
+            reactions[place] = condensed[len(rest) :]
             carried = Carried(section.loose[zone], reactions)
     return factors, carried

@@ -219,14 +219,11 @@ class Section:
                 each = spring * size[:, None, None] * np.outer(N, N)
                 np.add.at(K0, (elements[:, None, None], own[:, :, None], own[:, None, :]), each)
 
-    def stiffness(self, unknowns: Ints, block: Ints | None = None) -> Stiffness:
-        """Return the stiffness on some unknowns, numbered in their order, for any wavenumber.
-
-        ``block`` are unknowns that a dense matrix couples too; by default none.
-        """
-        assembly = Assembly(self.dofs, unknowns, self.n, block)
+    def stiffness(self, unknowns: Ints) -> Stiffness:
+        """Return the stiffness on some unknowns, numbered in their order, for any wavenumber."""
+        assembly = Assembly(self.dofs, unknowns, self.n)
         terms = [assembly.values(slice(None), each) for each in self._elements]
-        return Stiffness(assembly, np.stack(terms))
+        return Stiffness(assembly.pattern, np.stack(terms))
 
     def strain_matrices(
         self, elements: Ints, unknowns: Ints
@@ -291,14 +288,13 @@ class Stiffness:
     pattern : upper triangle of all K_k, values not set
     """
 
-    def __init__(self, assembly: Assembly, terms: Array) -> None:
-        self.pattern, self._assembly, self._terms = assembly.pattern, assembly, terms
+    def __init__(self, pattern: sparse.csr_array, terms: Array) -> None:
+        self.pattern, self._terms = pattern, terms
 
-    def at(self, k: float, taken: Array | None = None) -> Array:
-        """Return the values of K_k on the pattern, less those ``taken`` (b, b) on its block."""
+    def at(self, k: float) -> Array:
+        """Return the values of K_k on the pattern [N/mm2]."""
         K0, K1, K2 = self._terms
-        values = np.asarray(K0 + k * (K1 + k * K2))
-        return values if taken is None else values - self._assembly.block_values(taken)
+        return np.asarray(K0 + k * (K1 + k * K2))
 
     @property
     def terms(self) -> list[sparse.csr_array]:
