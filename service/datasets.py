@@ -1,9 +1,9 @@
 """The data set of a study: as its last end left it, and before its first one of the runs there are.
 
 The latter is made in another process, in a folder for temporary files, when somebody asks for it,
-and again when runs have been added. For this callers have turns of their own, one at a time, so
-that nothing else waits for it. One that took long is made seldom: a study that adds a run each
-second would keep a processor busy.
+and again when runs have been added; meanwhile the one before is given. For this callers have turns
+of their own, one at a time, so that nothing else waits for it. One that took much processor time is
+made seldom: a study that adds a run each second would keep a processor busy.
 """
 
 from __future__ import annotations
@@ -40,13 +40,15 @@ FOUND_KEPT = 16
 """Number of studies of which is kept what they found."""
 
 REST = 10.0
-"""Time for which a data set is kept though runs were added, as a multiple of that of making it."""
+"""Time for which a data set is kept though runs were added, as a multiple of the processor time of
+making it."""
 
 SECONDS = 600.0
 """Longest time of making one [s]."""
 
-PATIENCE = 50.0
-"""Longest time that a request waits for one [s]; then the answer is to ask later."""
+PATIENCE, BRIEFLY = 20.0, 2.0
+"""Longest time that a request waits for one [s], after which the answer is to ask later; and that
+after which it is the one before, if there is one."""
 
 LARGE = (
     "the data set of the runs that are there takes too long, or too much memory, to be made in "
@@ -155,9 +157,13 @@ class Datasets:
         if task is None or task.done():
             task = asyncio.create_task(self._combined(job.id, study, made, share))
             made.tasks[share.caller] = task
+        elif made.path:
+            return made.path
         try:
-            return await asyncio.wait_for(asyncio.shield(task), PATIENCE)
+            return await asyncio.wait_for(asyncio.shield(task), BRIEFLY if made.path else PATIENCE)
         except TimeoutError:
+            if made.path:
+                return made.path
             raise Busy("the data set is being made of the runs that are there: ask later") from None
 
     def _offered(self, made: _Offered) -> Path | None:
@@ -176,7 +182,7 @@ class Datasets:
         async with share.turn() as turn:
             if path := self._offered(made):
                 return path
-            of, began = state_of(self.store.catalogue.path), time.monotonic()
+            of = state_of(self.store.catalogue.path)
             if self.folder is None:
                 self.folder = self.folders.enter_context(scratch())
             target = self.folder / f"{study_id}-{made.number + 1}.nc"
@@ -186,7 +192,7 @@ class Datasets:
             except StoreFull:  # not the data directory
                 raise OSError(errno.ENOSPC, "no room is left for temporary files") from None
             except Beyond:
-                made.until = rested(began)
+                made.until = rested(turn.spent)
                 if made.path is None:
                     raise Busy(LARGE, math.ceil(made.until - time.monotonic())) from None
                 return made.path
@@ -194,7 +200,7 @@ class Datasets:
                 for part in target.parent.glob(f"{target.name}.*"):  # of a process that was ended
                     part.unlink(missing_ok=True)
             made.of, made.path, made.number = of, target, made.number + 1
-            made.until = rested(began)
+            made.until = rested(turn.spent)
             self._forget(study_id, made.number - 2)  # the one before may still be sent
             self._keep_few(study_id)
             return target
@@ -221,7 +227,6 @@ class Datasets:
         self.folders.close()
 
 
-def rested(began: float) -> float:
-    """Return until when a data set stays that was begun at a time, and has just been made."""
-    now = time.monotonic()
-    return now + REST * (now - began)
+def rested(spent: float) -> float:
+    """Return until when a data set stays that has just been made, in this processor time [s]."""
+    return time.monotonic() + REST * spent

@@ -7,6 +7,7 @@ a core.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,10 @@ def computing_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute in threads of this process, which knows the fake scene."""
 
     async def apart(self: Turn, function: Any, *given: Any, **named: Any) -> Any:
-        return await asyncio.to_thread(function, *given)
+        begun = time.monotonic()
+        try:
+            return await asyncio.to_thread(function, *given)
+        finally:
+            self.spent += time.monotonic() - begun
 
     monkeypatch.setattr(Turn, "apart", apart)

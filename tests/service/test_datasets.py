@@ -117,6 +117,37 @@ def test_a_data_set_is_made_again_when_runs_were_added_but_not_too_often(
     assert not folder.exists()
 
 
+def test_the_one_before_is_given_while_one_of_more_runs_is_made(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held, made, go = running.app.state.datasets, reading.combined, threading.Event()
+    before = running.dataset().content
+    offered = held.made[running.study.id]
+    offered.of, offered.until, began = None, 0.0, list[object]()  # as when runs were added
+
+    def combined(*given: Any) -> None:
+        began.append(given)
+        assert go.wait(20.0)
+        made(*given)
+
+    async def asked() -> tuple[list[Path], float]:
+        job, share = running.jobs.get(running.study.id), Share(Turns(2), "anna")
+        start = time.monotonic()
+        paths = [await held.current(job, share, share) for _ in range(3)]
+        waited = time.monotonic() - start
+        go.set()
+        await offered.tasks["anna"]
+        return [*paths, await held.current(job, share, share)], waited
+
+    monkeypatch.setattr(datasets, "BRIEFLY", 0.05)
+    monkeypatch.setattr(datasets, "PATIENCE", 60.0)
+    monkeypatch.setattr(datasets, "REST", 1e6)
+    monkeypatch.setattr(reading, "combined", combined)
+    (*earlier, later), waited = asyncio.run(asked())
+    assert len({*earlier}) == 1 and earlier[0].read_bytes() == before and later != earlier[0]
+    assert len(began) == 1 and waited < datasets.PATIENCE / 2, "one request waits, and briefly"
+
+
 def test_one_that_took_long_stays_though_others_were_asked_for_meanwhile(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
