@@ -160,6 +160,6 @@ class Inspector:
             allowed = "cannot be read: a library that reads its meshes fails with them"
             raise StudyError("scene", _FILE, allowed)
         if answer.failed:
-            raise beyond("scene", _FILE, self.seconds)
+            raise beyond("scene", _FILE, self.seconds if answer.failed == errno.ETIME else None)
         found: dict[str, Any] = json.loads(answer.text)
         return found

@@ -29,6 +29,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NoReturn
 
+import psutil
 from anyio import CapacityLimiter, fail_after, sleep, to_thread
 from threadpoolctl import threadpool_limits
 
@@ -83,6 +84,13 @@ class Ended(RuntimeError):
     """The process has ended without an answer."""
 
 
+@dataclass
+class Overdue(Exception):
+    """The process has not ended in time; ``used`` is its processor time until then [s]."""
+
+    used: float
+
+
 @dataclass(frozen=True, slots=True)
 class Answer:
     """What a call gave that was shut in.
@@ -105,7 +113,7 @@ async def call(
 ) -> tuple[Any, Exception | None, float]:
     """Return what a function gives, or the error that it raises, and its processor time [s].
 
-    All must be picklable. Raise `TimeoutError` after ``seconds``, `Ended` without an answer. A
+    All must be picklable. Raise `Overdue` after ``seconds``, `Ended` without an answer. A
     process with a larger niceness ``nice`` waits for others.
     """
     content, _ = await _called(_answer, function, (*given, nice), seconds)
@@ -130,7 +138,7 @@ async def call_shut_in(
     Parameters
     ----------
     cpu : its processor time, in whole seconds
-    seconds : its time; `TimeoutError` is raised after it
+    seconds : its time; `Overdue` is raised after it
     nice : as of `call`
     """
     told = *given, folder, cpu, nice
@@ -149,15 +157,28 @@ async def _called(
     module, one = getattr(function, "__module__", None) or "", CapacityLimiter(1)
     start = partial(READERS.start, answer, function, given, pipes=(theirs,), module=module)
     with theirs:
-        fork = await to_thread.run_sync(start, limiter=one)
+        try:
+            fork = await to_thread.run_sync(start, limiter=one)
+        except OSError as error:
+            raise Overdue(0.0) if error.errno == errno.ETIMEDOUT else error from None
     try:
         with fail_after(seconds):
             content = await to_thread.run_sync(_all, ours, limiter=one, abandon_on_cancel=True)
             while (status := fork.returncode) is None:
                 await sleep(0.001)
             return content, status
+    except TimeoutError:
+        raise Overdue(_processor_time(fork.pid)) from None
     finally:
         fork.kill()
+
+
+def _processor_time(pid: int) -> float:
+    """Return the processor time of a process [s]; 0 if it has just ended."""
+    with suppress(psutil.Error):
+        used = psutil.Process(pid).cpu_times()
+        return float(used.user + used.system)
+    return 0.0
 
 
 def _all(pipe: Connection) -> bytes:

@@ -196,7 +196,7 @@ class Turn:
         Beyond
             if time or memory did not suffice; errors of the function are raised too
         Busy
-            if the process was killed
+            if the process was killed, or waited for the processors for most of the time
         """
         with self._refused(field, name, seconds, advice):
             found, failed, spent = await sandbox.call(
@@ -204,7 +204,7 @@ class Turn:
             )
         self.spent += spent
         if isinstance(failed, MemoryError):
-            raise beyond(field, name, seconds, advice)
+            raise beyond(field, name, None, advice)
         if failed is not None:
             raise failed
         return cast("Found", found)
@@ -233,7 +233,10 @@ class Turn:
             self.spent += time.monotonic() - begun
             if isinstance(error, sandbox.Ended):
                 raise Busy(f"the process that reads a {field} has ended: ask again") from None
-            if isinstance(error, TimeoutError):
+            if isinstance(error, sandbox.Overdue):
+                if error.used < seconds / 2:
+                    had = f"{error.used:.2g} s of processor time in {seconds:g} s"
+                    raise Busy(f"the process that reads a {field} had {had}: ask again") from None
                 raise beyond(field, name, seconds, advice) from None
             raise
 
@@ -278,7 +281,7 @@ class Share:
             return await turn.apart(function, *given, **limits)
 
 
-def beyond(field: str, name: object, seconds: float, advice: str = "") -> Beyond:
-    """Return the error for what takes more than this time, or more memory than is allowed."""
-    allowed = f"must be read within {seconds:g} s and {BYTES / 2**30:.3g} GiB of memory"
-    return Beyond(field, name, allowed + advice)
+def beyond(field: str, name: object, seconds: float | None, advice: str = "") -> Beyond:
+    """Return the error for what takes more than this time; None: more memory than is allowed."""
+    limit = f"within {seconds:g} s" if seconds else f"with {BYTES / 2**30:.3g} GiB of memory"
+    return Beyond(field, name, f"must be read {limit}{advice}")

@@ -29,6 +29,7 @@ from service.job import Job, StudyState, verdict
 from service.jobs import Jobs, forget, put
 from service.processes import share_arenas
 from service.recovery import add
+from service.sandbox import READERS
 from service.settings import Settings
 from solver.files import NoFile, opened
 from studies.definition.study import Study
@@ -130,7 +131,11 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
     """
     with scratch() as folder:
         settings = Settings(data=folder, host=HOST, root_path="", require_keys=False)
-        if (path / "studies").is_dir() or blobs_at(path).names("studies/*/study.json"):
+        from studies.views.reading import begun_in, find_study, present_datasets
+
+        if not _is_folder(path) and not present_datasets(path):
+            path = begun_in(path) or path  # a study that is being computed, in its folder
+        if _is_folder(path):
             shown = ViewedFolder(path, folder)
             shown.look()
             _tell_others(path, shown)
@@ -143,7 +148,6 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
                 ended.set()
                 watch.join()
             return
-        from studies.views.reading import find_study
         from studies.views.unpacked import Unpacked
 
         store = Unpacked(find_study(path), folder)
@@ -151,6 +155,10 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
         jobs.accept(store.study_id, store.content, store.run_ids)
         jobs.finish(store.study_id, *verdict(store.counts), standing=StudyState.ACCEPTED)
         yield assembled(settings, store, jobs, None), f"/ui/studies/{store.study_id}"
+
+
+def _is_folder(path: Path) -> bool:
+    return (path / "studies").is_dir() or bool(blobs_at(path).names("studies/*/study.json"))
 
 
 def _watch(shown: ViewedFolder, ended: threading.Event) -> None:
@@ -186,6 +194,7 @@ def view(path: Path, port: int = 0, browser: bool = True) -> None:
         allowed = f"must be free, or left out for any free one ({error.strerror})"
         raise StudyError("--port", port, allowed) from None
     share_arenas()
+    READERS.prepare()  # loads while the folder is looked at
     with listening, application(path) as (app, first):
         url = f"http://{HOST}:{listening.getsockname()[1]}{first}"
         print(f"{url}  (Ctrl-C ends it)", flush=True)

@@ -288,6 +288,11 @@ def begun_studies(path: Path | str) -> list[str]:
     return list(_begun(path))
 
 
+def begun_in(path: Path | str) -> Path | None:
+    """Return the output directory of a study at `path` whose runs can be read before its end."""
+    return next(filter(None, _begun(path).values()), None)
+
+
 def _begun(path: Path | str) -> dict[str, Path | None]:
     """Return the lines of `begun_studies`, each with its output directory if runs can be read."""
     path = Path(path).resolve()

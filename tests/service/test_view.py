@@ -21,6 +21,7 @@ import xarray as xr
 from fastapi.testclient import TestClient
 
 from residua.cli import main
+from service import view
 from service.job import StudyState
 from service.view import ViewedFolder, application
 from studies import Store, Study, StudyError, open_netcdf, open_study
@@ -91,6 +92,24 @@ def test_a_folder_is_shown_and_nothing_is_written_there(folder: tuple[Study, Sto
             assert answer.status_code == 403 and "only show" in answer.text, path
     assert content(store.directory) == before
     damaged.unlink()
+
+
+def test_a_study_without_a_data_set_is_shown_in_its_folder(
+    folder: tuple[Study, Store], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    directory = folder[1].directory
+    with shown(directory / "begun") as (client, first):
+        assert first == "/ui" and "begun" in client.get(first).text
+    looks = iter([False])  # the first look is before the study is stored
+
+    def is_folder(path: Path) -> bool:
+        return next(looks, looked(path))
+
+    looked = view._is_folder
+    monkeypatch.setattr(view, "_is_folder", is_folder)
+    monkeypatch.setattr("studies.views.reading.present_datasets", lambda path: [])
+    with shown(directory) as (_, first):
+        assert first == "/ui"
 
 
 def test_a_study_that_is_computed_elsewhere_is_followed(
