@@ -15,6 +15,7 @@ import xarray as xr
 from studies.definition.identity import canonical
 from studies.definition.vocabulary import MISSING, SOLVED
 from studies.errors import StudyError, one_of
+from studies.kinds import kind_of
 from studies.numbers import number_text
 from studies.toml import CASE
 from studies.views.columns import aligned, placed, unit_text
@@ -103,13 +104,17 @@ def diff(first: xr.Dataset, second: xr.Dataset, ignore: Sequence[str] = ()) -> D
     Raises
     ------
     StudyError
-        if the studies are of two scenes, one has no runs, or two of the same parameters, or neither
-        has a parameter that is to be ignored
+        if the studies are of two scenes, one has answers and one runs, one has no runs, or two of
+        the same parameters, or neither has a parameter that is to be ignored
     """
     sides = [each.drop_dims("cell", errors="ignore") for each in (first, second)]
     scenes = [each.attrs.get("scene") for each in sides]
     if scenes[0] != scenes[1]:
         raise StudyError("scene", scenes[1], f"must be that of the other study, {scenes[0]}")
+    kinds = [kind_of(each.attrs) for each in sides]
+    if kinds[0].of_runs != kinds[1].of_runs:
+        allowed = f"has {kinds[1].rows}, the other study {kinds[0].rows}: both must have one kind"
+        raise StudyError("runs", _name(sides[1]), allowed)
     every = [list(_runs(each)) for each in sides]
     for side, there in zip(sides, every, strict=True):
         if not there:

@@ -117,6 +117,15 @@ def test_other_grids_are_interpolated_and_statuses_told(tmp_path: Path) -> None:
         difference_figure(told)
 
 
+def test_answers_are_not_compared_with_runs(tmp_path: Path) -> None:
+    goal = {"find": "first_yield", "between": [0.1, 1.0]}
+    search_here(Study.from_dict({"name": "goal", "scene": "fake", "goal": goal}), Store(tmp_path))
+    with open_study(tmp_path) as answers, open_study(made(tmp_path / "b", sweep=SWEEP)) as runs:
+        with pytest.raises(StudyError, match="runs = 'b': has runs, the other study answers: both"):
+            diff(answers, runs)
+        assert diff(answers, answers).same
+
+
 def test_a_parameter_of_one_version_does_not_count(tmp_path: Path) -> None:
     path = made(tmp_path / "a", sweep=SWEEP)
     with open_study(path) as before, open_study(path) as after:
