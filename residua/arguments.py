@@ -115,7 +115,8 @@ def _add_pictures(add: Add) -> None:
         "what", metavar="SCENE|STUDY.toml",
         help="name of a scene, its file, or a study, whose first run is drawn",
     )  # fmt: skip
-    _several(one, "--set", "NAME=VALUE", "in place of those of the study or the defaults")
+    words = "parameters, in place of those of the study or the defaults"
+    _several(one, "--set", "NAME=VALUE", words)
     one.add_argument("--zoom", type=float, metavar="MM", help="only within this distance of 0, 0")
     _add_window(one)
 

@@ -76,11 +76,11 @@ def shown(column: Column, floors: Floors, at: Any = ...) -> Any:
 
 
 def cell_text(column: Column, at: int, floors: Floors) -> str:
-    """Return a value as the tables show it: four digits, a flag by its word, rounding as 0."""
+    """Return a value as the tables show it: four digits, counts all, a flag by its word."""
     value = shown(column, floors, at)
     if column.flags and value == value:
         return str(column.flags.get(int(value), value)).replace("_", " ")
-    return number(value)
+    return number(int(value) if column.whole and value == value else value)
 
 
 def part(table: RunTable, query: Mapping[str, str]) -> TablePart:

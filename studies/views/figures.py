@@ -132,7 +132,7 @@ class Worst:
 
 def meter(value: float, limit: float) -> float:
     """Return the length of a meter, 0 to 1: the place between limit / 1e6 and limit in decades."""
-    if not limit or value <= 0.0:
+    if not limit or not value > 0.0:  # NaN is none
         return 0.0
     return min(max(1.0 + math.log10(value / limit) / 6.0, 0.02), 1.0)
 

@@ -168,6 +168,12 @@ def test_slip_and_wear_of_rounding_are_zero_also_alone() -> None:
         assert shown == {"wear_depth": text, "slip_length": "0"}
 
 
+def test_a_run_shows_all_digits_of_its_counts() -> None:
+    run = {"scalars": {"degrees_of_freedom": 1234567, "increments": None, "cpu_seconds": 1234567.0}}
+    shown = {each.name: text for each, (text,) in numbers_shown(numbers_of([run], None))}
+    assert shown == {"degrees_of_freedom": "1234567", "increments": "–", "cpu_seconds": "1.235e+06"}
+
+
 def test_a_run_shows_the_accuracy_with_which_it_was_computed() -> None:
     for stored, told in ((0, "draft"), (1, "draft, computed with standard")):
         run = {"parameters": {"accuracy": "draft"}, "scalars": {"computed_accuracy": stored}}

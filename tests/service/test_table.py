@@ -479,6 +479,11 @@ def test_a_page_shows_only_limits_that_every_run_has() -> None:
     assert [each["of"].name for each in found["others"]] == ["audit_energy", "audit_reactions"]
 
 
+def test_a_limit_of_a_figure_that_a_run_lacks_is_not_kept() -> None:
+    (found,) = audited(numbers_of([{"scalars": {"audit_law": None}}], None))["limited"]
+    assert (found["kept"], found["share"]) == (False, 0.0)
+
+
 def test_files_are_read_in_processes_of_their_own(tmp_path: Path) -> None:
     """The netCDF library ends a process in which two threads use it."""
 
