@@ -20,7 +20,7 @@ from service.errors import QueueLost
 from service.job import StudyState
 from service.jobs import Jobs
 from service.runner import Runner
-from service.scenes import OUTCOMES
+from service.search import OUTCOMES
 from studies.errors import CatalogueDamaged, StoreBusy, StoreFull
 from studies.storage.store import Store
 

@@ -45,7 +45,7 @@ from studies.errors import StudyError
 from studies.kinds import kind_of
 from studies.scenes.registry import known_names
 from studies.storage.store import Store
-from studies.views.figures import elasticities
+from studies.views.elasticities import elasticities
 from studies.views.table import MESSAGE, RUN, STATUS, RunTable, varied
 
 router = APIRouter(prefix=ROOT, include_in_schema=False, route_class=PageRoute)

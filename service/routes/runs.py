@@ -20,8 +20,8 @@ from service.dependencies import (
 from service.errors import REFUSED
 from service.files import NETCDF, netcdf
 from service.maps import PICTURE
-from service.scenes import conditions
 from service.schemas import LineQuery, MapQuery, Run, RunFilter, RunPage
+from service.search import conditions
 from solver.late import Late
 
 VTU = "application/xml"

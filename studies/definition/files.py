@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from solver.errors import ModelError
+from studies.definition.rows import read_table
 from studies.errors import StudyError
 from studies.kinds import KINDS
 from studies.materials import read_material
 from studies.scenes.formats import FORMATS
-from studies.toml import CASE, read_given, read_table, toml_of
+from studies.toml import CASE, read_given, toml_of
 
 POINTS = "points"
 """Entry of a study: its points, or the file that has them."""

@@ -19,8 +19,8 @@ from studies.storage import ran, runfile, seal
 from studies.storage.dataset import RunContent
 from studies.storage.estimated import WITHOUT, described, numbers_in, with_errors, without
 from studies.storage.made import Combined, Made, held
+from studies.storage.origin import origin
 from studies.storage.provenance import provenance
-from studies.storage.ran import origin
 from studies.storage.store import Store
 
 _NAME = "data set"

@@ -27,8 +27,9 @@ from studies.execution.asking import Asking
 from studies.execution.bundles import Bundle, bundles
 from studies.execution.estimate import memory_needed
 from studies.execution.executor import Event, Executor, Finished, Here, Limits, Message, Waiting
-from studies.execution.forks import SHARED, check_script
+from studies.execution.forks import SHARED
 from studies.execution.result import answered, result
+from studies.execution.script import check_script
 from studies.execution.task import PathTask, Proof, proof_of, walk
 from studies.storage.store import Store
 

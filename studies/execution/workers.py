@@ -28,7 +28,8 @@ from solver.files import read_file
 from solver.parts import own_files
 from studies.errors import GridLost, Unusable
 from studies.execution.access import CONFIGURATION, Access, reported_if_late
-from studies.execution.forks import GUARD, SHARED, Fork, Forks, check_script, interrupts_blocked
+from studies.execution.forks import SHARED, Fork, Forks, interrupts_blocked
+from studies.execution.script import GUARD, check_script
 from studies.scratch import scratch
 
 _LOOKS = 0.2

@@ -22,8 +22,8 @@ from studies.storage import dataset as layout
 from studies.storage import ran, seal
 from studies.storage.frame import Frame, write_beside
 from studies.storage.made import Combined
+from studies.storage.origin import origin
 from studies.storage.provenance import provenance, together, what_ran
-from studies.storage.ran import origin
 from studies.storage.room import Reservoir, needs_room
 from studies.storage.runfile import global_attributes, opened
 from studies.storage.store import Store

@@ -31,8 +31,8 @@ from studies.errors import StudyError
 from studies.execution.run import StudyOutcome
 from studies.scenes.file_scene import FileScene
 from studies.storage import runfile, seal
+from studies.storage.origin import PROGRAM, files_of, meshes_of
 from studies.storage.provenance import NONE
-from studies.storage.ran import PROGRAM, files_of, meshes_of
 from studies.storage.store import Store
 from studies.views.columns import placed
 from studies.views.differing import diff, difference_table

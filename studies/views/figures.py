@@ -1,21 +1,15 @@
-"""What the numbers of runs tell: their groups, audit, elasticities, and what of them is rounding.
-
-Elasticities tell by how many percent a number changes if a parameter is 1 % larger. They follow
-from the derivatives of the runs (`solver.derivatives`).
-"""
+"""The numbers of runs: their groups, the worst of the audit, and what of them is rounding."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from solver.audit.figures import AUDIT, LIMITS
-from solver.derivatives.asked import named
-from solver.typing import Array
 from studies.numbers import rounding
 
 FIGURES: Mapping[str, str] = {
@@ -97,7 +91,7 @@ EFFORT = (
 
 
 def group_of(name: str) -> str:
-    """Return what a number of a run tells: ``result``, ``effort`` or ``audit``."""
+    """Return the group of a number of a run: ``result``, ``effort`` or ``audit``."""
     if name in AUDIT or name.startswith("audit_"):
         return "audit"
     return "effort" if name in EFFORT else "result"
@@ -151,30 +145,3 @@ def worst(numbers: Mapping[str, np.ndarray]) -> list[Worst]:
             at = int(np.nanargmax(values))
             found.append(Worst(name, float(values[at]), limit, at))
     return sorted(found, key=lambda each: -each.share)
-
-
-def derived(names: Collection[str], parameters: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Yield each number and each parameter of which there is a derivative among the names."""
-    known = sorted(names)
-    for by in parameters:
-        yield from ((of, by) for of in known if named(of, by) in names)
-
-
-def elasticities(
-    values: Mapping[str, Any], parameters: Mapping[str, Any]
-) -> dict[str, dict[str, Array]]:
-    """Return the elasticities of the numbers of runs that are known: by number, by parameter.
-
-    Parameters
-    ----------
-    values : numbers and derivatives by name, of a run or of several; None where one is not known
-    parameters : of the runs
-    """
-    found: dict[str, dict[str, Array]] = {}
-    for of, by in derived(values, parameters):
-        if values[of] is not None and values[named(of, by)] is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                each = np.ravel(np.divide(values[named(of, by)] * parameters[by], values[of]))
-            if (known := each[np.isfinite(each)]).size:
-                found.setdefault(of, {})[by] = known
-    return found

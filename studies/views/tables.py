@@ -36,7 +36,8 @@ from studies.views.columns import (
     value_text,
     with_unit,
 )
-from studies.views.figures import FIGURES, Floors, derived, elasticities, worst
+from studies.views.elasticities import derived, elasticities
+from studies.views.figures import FIGURES, Floors, worst
 from studies.views.picking import each_run, flags, over_runs, sweep_axes, sweep_coordinates, varied
 from studies.views.reading import open_study
 from studies.views.summary import NAMED, Failed, Summary, values_text

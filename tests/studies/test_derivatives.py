@@ -12,7 +12,7 @@ from studies import Store, Study, StudyError, fit, open_study
 from studies.execution.estimate import estimate
 from studies.scenes.description import Description
 from studies.scenes.scene import file_scene, read_scene
-from studies.views.figures import elasticities
+from studies.views.elasticities import elasticities
 from studies.views.tables import elasticity_table, runs_table
 from tests.marks import HERE
 from tests.studies.conftest import compute_here

@@ -20,7 +20,7 @@ from studies.scenes.shipped import SHIPPED
 from studies.storage import ran
 from studies.storage.combine import combine
 from studies.storage.estimated import errors_of, of_requested, without
-from studies.storage.ran import files_of
+from studies.storage.origin import files_of
 from tests.studies.conftest import fake_study
 from tests.studies.fakes import NUMBERS, record
 

@@ -73,7 +73,7 @@ def test_a_sweep_in_this_process_needs_no_guard(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (0, "6.0\n"), done.stderr
 
 
-ASK = "from studies.execution.forks import check_script\n"
+ASK = "from studies.execution.script import check_script\n"
 
 
 @pytest.mark.parametrize(

@@ -24,10 +24,11 @@ from solver.scenes import Scene
 from solver.typing import Array
 from studies.definition.parameters import in_unit
 from studies.definition.quantity import Line, Read, Variable, known_variable, picked
+from studies.definition.rows import read_table
 from studies.definition.schema import Context, StudyTable, is_finite
 from studies.definition.sweep import linked_values
 from studies.errors import StudyError, Unchecked, one_of
-from studies.toml import CASE, read_table
+from studies.toml import CASE
 from studies.units import UnitError, number_in, under
 
 _HEADING = re.compile(r"(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
