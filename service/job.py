@@ -64,8 +64,12 @@ class Job:
     stage: str
 
 
-COLUMNS = tuple(each.name for each in fields(Job))
-"""Columns of the table besides the text of the study."""
+_KINDS = {
+    "str": "TEXT NOT NULL", "str | None": "TEXT", "StudyState": "TEXT NOT NULL",
+    "int": "INTEGER NOT NULL", "float": "REAL NOT NULL",
+}  # fmt: skip
+COLUMNS = {each.name: _KINDS[str(each.type)] for each in fields(Job)}
+"""Columns of the table besides the text of the study, and what SQLite takes in them."""
 
 
 def job_of(row: sqlite3.Row) -> Job:

@@ -22,7 +22,7 @@ from service.errors import Busy, Conflict, NotFound, QueueLost
 from service.job import COLUMNS, Job, StudyState, job_of, row_of, wanted
 from studies.storage.database import Database, WrongContent, check
 
-ALL = ", ".join(COLUMNS)
+ALL, DECLARED = ", ".join(COLUMNS), ", ".join(map(" ".join, COLUMNS.items()))
 MARKS = ", ".join("?" * len(COLUMNS))
 NEXT_TURN = "SELECT COALESCE(MAX(turn), 0) + 1 FROM job"
 BEGUN = {"state": StudyState.RUNNING, "message": "", "finished": None}
@@ -40,7 +40,7 @@ FORM = 5
 """Form of the tables; a queue of another form is set aside, and made again from the studies."""
 
 TABLES = (
-    f"CREATE TABLE job ({ALL}, study, PRIMARY KEY (id))",
+    f"CREATE TABLE job ({DECLARED}, study TEXT NOT NULL, PRIMARY KEY (id))",
     "CREATE INDEX job_by_turn ON job (turn)",
     "CREATE INDEX job_by_state ON job (state, priority, turn)",
     """CREATE TABLE run (

@@ -49,6 +49,15 @@ def test_a_reason_of_several_lines_is_one_line_of_the_log(jobs: Jobs, tmp_path: 
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("column", ["name", "turn", "bytes", "study"])
+def test_a_job_lacks_nothing_but_the_times_that_have_not_come(jobs: Jobs, column: str) -> None:
+    jobs.accept("a", STUDY, [])
+    with closing(sqlite3.connect(jobs.path)) as connection, connection:
+        connection.execute("UPDATE job SET started = NULL, finished = NULL")
+        with pytest.raises(sqlite3.IntegrityError, match=f"NOT NULL .* job.{column}"):
+            connection.execute(f"UPDATE job SET {column} = NULL")
+
+
 def test_first_come_first_served(jobs: Jobs) -> None:
     order = ["c", "a", "b"]
     for name in order:
