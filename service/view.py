@@ -133,12 +133,13 @@ def application(path: Path) -> Iterator[tuple[FastAPI, str]]:
         settings = Settings(data=folder, host=HOST, root_path="", require_keys=False)
         from studies.views.reading import begun_in, find_study, present_datasets
 
-        if not _is_folder(path) and not present_datasets(path):
-            path = begun_in(path) or path  # a study that is being computed, in its folder
-        if _is_folder(path):
-            shown = ViewedFolder(path, folder)
+        directory = path if _is_folder(path) else None
+        if directory is None and not present_datasets(path):
+            directory = begun_in(path)  # of a study that is being computed
+        if directory is not None:
+            shown = ViewedFolder(directory, folder)
             shown.look()
-            _tell_others(path, shown)
+            _tell_others(directory, shown)
             ended = threading.Event()
             watch = threading.Thread(target=_watch, args=(shown, ended))
             watch.start()

@@ -245,8 +245,8 @@ def find_datasets(path: Path | str) -> list[Path]:
     found = present_datasets(path)
     if not found:
         begun = _begun(path)
-        lines = list(begun)
-        if shown := next(filter(None, begun.values()), None):
+        lines = [line for line, _ in begun]
+        if shown := next((output for _, output in begun if output), None):
             there = f"residua view {shown} shows the runs that are there"
             lines += [f"{there}, and gives xarray.open_zarr its address with /studies/ID/zarr"]
         allowed = "; ".join(lines) or "must be a data set, a study or an output directory"
@@ -285,15 +285,15 @@ def begun_studies(path: Path | str) -> list[str]:
 
     The data set of a study is written when its computation ends, also after Ctrl-C.
     """
-    return list(_begun(path))
+    return [line for line, _ in _begun(path)]
 
 
 def begun_in(path: Path | str) -> Path | None:
     """Return the output directory of a study at `path` whose runs can be read before its end."""
-    return next(filter(None, _begun(path).values()), None)
+    return next((output for _, output in _begun(path) if output), None)
 
 
-def _begun(path: Path | str) -> dict[str, Path | None]:
+def _begun(path: Path | str) -> list[tuple[str, Path | None]]:
     """Return the lines of `begun_studies`, each with its output directory if runs can be read."""
     path = Path(path).resolve()
     name, path = ("", path) if path.is_dir() else (path.name, path.parent)
@@ -304,10 +304,10 @@ def _begun(path: Path | str) -> dict[str, Path | None]:
     begun = [file for file in begun if not file.with_name("dataset.nc").is_file()]
     begun = [each for each in begun if each.parent.name.startswith(name) or _name(each) == name]
     each = ((*_progress(file), file) for file in begun)
-    return {
-        f"{line}; no data set yet ({file.parent})": file.parents[2] if readable else None
+    return [
+        (f"{line}; no data set yet ({file.parent})", file.parents[2] if readable else None)
         for line, readable, file in each
-    }
+    ]
 
 
 def _progress(file: Path) -> tuple[str, bool]:
