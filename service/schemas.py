@@ -9,11 +9,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.job import StudyState
 from studies.definition.sweep import Axes
+from studies.errors import form
 from studies.kinds import KINDS
 
-ContentId = Annotated[
-    str, Path(pattern="^[0-9a-f]{32}$", description="content id, 32 hexadecimal digits")
-]
+ID = form("^[0-9a-f]{32}$", "must be an id, 32 hexadecimal digits, as lists of the service have it")
+ContentId = Annotated[str, Path(pattern=ID, description="content id, 32 hexadecimal digits")]
 
 
 class Window(BaseModel):

@@ -12,7 +12,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from solver.files import LARGEST
 from solver.memory import most_kept
-from studies.errors import StudyError
+from studies.errors import StudyError, form
 from studies.execution.access import Access
 from studies.execution.estimate import Bounds
 from studies.execution.executor import Limits
@@ -55,7 +55,7 @@ class Settings(BaseSettings):
     )
     root_path: str = Field(
         default="",
-        pattern=r"^(/[\w.~-]+)*$",
+        pattern=form(r"^(/[\w.~-]+)*$", "must be a path such as /residua, or empty"),
         description="path that a proxy strips",
     )
     scheduler: str | None = Field(

@@ -291,11 +291,14 @@ _WORDS = {
 }
 """Type of a pydantic error -> what is allowed."""
 
-_FORMS = {
-    "^[0-9a-f]{32}$": "must be an id, 32 hexadecimal digits, as lists of the service have it",
-    r"^(/[\w.~-]+)*$": "must be a path such as /residua, or empty",
-}
-"""Pattern of a text -> what is allowed."""
+_FORMS: dict[str, str] = {}
+"""Pattern of a text -> what is allowed, as `form` declares it."""
+
+
+def form(pattern: str, allowed: str) -> str:
+    """Return a pattern of texts, and keep the words in which another text is refused."""
+    _FORMS[pattern] = allowed
+    return pattern
 
 
 def worded(error: Mapping[str, Any]) -> str:

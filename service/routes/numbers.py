@@ -15,7 +15,7 @@ from service.dependencies import TheReading, TheRun, TheStore, TheTables
 from service.errors import CONTENT, REFUSED
 from service.files import OCTETS, UNCHANGED, octets, tagged, unchanged
 from service.overview import OUTCOMES
-from service.schemas import AuditFigure, ContentId, NumbersFilter, TableFilter
+from service.schemas import ID, AuditFigure, ContentId, NumbersFilter, TableFilter
 from solver.late import Late
 from studies.errors import StudyError
 from studies.storage.seal import digest
@@ -163,7 +163,7 @@ async def values(
     field: str,
     component: str | None = None,
     stage: str | None = None,
-    minus: Annotated[str | None, Query(pattern="^[0-9a-f]{32}$")] = None,
+    minus: Annotated[str | None, Query(pattern=ID)] = None,
 ) -> Response:
     """Return a map, or lines, of a run as octets: the coordinates, then the values over them.
 
