@@ -33,7 +33,7 @@ def full_disk(server: Server) -> list[Figure]:
         told = time.monotonic() - began
         refused = server.client.post("/studies", json=fake_study("refused")).status_code
         ballast.unlink()
-        end = server.finished(study_id, 120.0)
+        end = server.finished(study_id)
     finally:
         server.close()
         subprocess.run(["umount", "-l", str(server.data)], check=False)

@@ -42,10 +42,10 @@ def fairness(server: Server) -> list[Figure]:
     }
     restarted(server, RESIDUA_REQUIRE_KEYS="true")
     server.client.headers.update(headers["bert"])
-    study = server.finished(server.post(fake_study("many") | {"sweep": {}, "sample": SAMPLE}), 300)
+    study = server.finished(server.post(fake_study("many") | {"sweep": {}, "sample": SAMPLE}))
     own, run = study["id"], study["runs"][0]["id"]
     small: dict[str, Any] = fake_study("small")
-    asks = (
+    asks: tuple[tuple[str, str, dict[str, Any]], ...] = (
         ("GET", f"/ui/studies/{own}", {}),
         ("GET", f"/ui/runs/{run}", {}),
         ("GET", f"/runs/{run}/fields", {}),

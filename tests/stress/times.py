@@ -26,7 +26,7 @@ def clock(server: Server) -> list[Figure]:
     jobs = Jobs(server.data / "jobs.sqlite")
     with jobs.transaction() as queue:
         for job in jobs.page(limit=10, offset=0)[0]:
-            times = {
+            times: dict[str, Any] = {
                 name: (datetime.fromisoformat(value) + AHEAD).isoformat()
                 for name in ("submitted", "started", "finished")
                 if (value := getattr(job, name))
@@ -34,7 +34,7 @@ def clock(server: Server) -> list[Figure]:
             put(queue, replace(job, **times))
     restarted(server, RESIDUA_KEEP_DAYS="1")
     after = server.finished(server.post(study("after")))
-    ends = [server.finished(each, 120.0) for each in (*(b["id"] for b in before), waiting)]
+    ends = [server.finished(each) for each in (*(b["id"] for b in before), waiting)]
     sent = [server.client.get(f"/studies/{each['id']}/dataset.nc") for each in (*ends, after)]
     listed = server.client.get("/studies").json()["items"]
     return [
@@ -58,7 +58,7 @@ def retention(server: Server) -> list[Figure]:
         wait_until(lambda: server.client.get(f"/studies/{old['id']}").status_code == 404)
         figures.append(Figure(f"{name}: the running study is gone", gone(server, running), most=0))
         server.settings.pop(name)
-    end = server.finished(running, 120.0)
+    end = server.finished(running)
     lost = len(FRICTIONS) - end["counts"].get("ok", 0)
     return [*figures, Figure("runs of it that are lost", lost, most=0)]
 

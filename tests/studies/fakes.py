@@ -170,7 +170,9 @@ class Canned(Scene):
     costs: tuple[Any, ...] = ()
     records: Any = None
 
-    def path(self, parameters: Any, values: Sequence[float], monitor: Monitor) -> Iterator[Record]:
+    def path(
+        self, parameters: Any, values: Sequence[float], monitor: Monitor, begun: Any = None
+    ) -> Iterator[Record]:
         return self.records(parameters, values, monitor)
 
 

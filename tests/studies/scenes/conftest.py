@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from studies.scenes.description import Description
-from studies.scenes.scene import FileScene, file_scene
+from studies.scenes.file_scene import FileScene
+from studies.scenes.scene import file_scene
 
 BLOCKS = """
 name = "blocks"
