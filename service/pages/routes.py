@@ -165,7 +165,8 @@ def _study(
     if number not in numbers:
         asked = entry.get("of", "")
         number = asked if asked in numbers else next(iter(numbers), "")
-    at = shown.chosen_run(table, query.get("run", ""), number)
+    marks = found.marks if found else ()
+    at = shown.chosen_run(table, query.get("run", ""), number, marks)
 
     def turn(**other: Any) -> str:
         kept = {k: v for k, v in {**query, **other}.items() if v not in ("", None)}

@@ -13,6 +13,7 @@ from solver.audit.figures import LIMITS
 from solver.scenes import Scene
 from studies.definition.parameters import parameters_of
 from studies.definition.vocabulary import OK
+from studies.kinds.kind import Mark
 from studies.views.columns import COMPUTED, computed_text, unit_text
 from studies.views.figures import FIGURES, Floors, group_of, meter, varies
 from studies.views.html import number
@@ -112,15 +113,17 @@ def part(table: RunTable, query: Mapping[str, str]) -> TablePart:
     return TablePart(columns, rows, len(found), page, pages, sort, where)
 
 
-def chosen_run(table: RunTable, wanted: str, number: str) -> int | None:
-    """Return the position of a run: of this id, or the one with the largest number.
+def chosen_run(table: RunTable, wanted: str, number: str, marks: Sequence[Mark]) -> int | None:
+    """Return the position of a run: of this id, at the first mark, or with the largest number.
 
     Without any that succeeded it is the first that has been computed, if there is one.
     """
-    ids = table.columns[RUN].values
-    at = np.flatnonzero(ids == wanted)
-    if len(at):
-        return int(at[0])
+    at = table.columns[RUN].values == wanted
+    if marks and not at.any():
+        places = ((name, value) for name, (value, _, _) in marks[0].items())
+        at = np.all([table.columns[name].values == value for name, value in places], axis=0)
+    if at.any():
+        return int(at.argmax())
     status = table.columns[STATUS].values
     column = table.columns.get(number)
     values = column.values if column is not None and column.number else np.zeros(table.size)

@@ -373,6 +373,9 @@ def test_a_minimum_is_estimated_searched_and_shown(service: Server) -> None:
     page = service.client.get(f"/ui/studies/{study_id}").text
     marks = json.loads(re.search(r'"found": (\[.*?\]\}\])', page)[1])
     assert 0.3 < marks[0]["load_ratio"][0] < 0.32
+    assert "Least max_plastic_strain where max_plastic_strain &gt; 0.3: " in page
+    (best,) = [r for r in detail["runs"] if r["at"]["load_ratio"] == marks[0]["load_ratio"][0]]
+    assert f"/ui/runs/{best['id']}" in page, "the run that is shown at first"
     refused = service.client.post("/studies", json=study | {"minimise": {**asked, "where": "a"}})
     assert refused.json()["errors"][0]["field"] == "minimise.where"
 

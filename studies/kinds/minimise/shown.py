@@ -12,6 +12,9 @@ from studies.kinds.kind import Found
 from studies.views.best import best_runs
 from studies.views.columns import unit_of, value_text
 
+_ENDS = {"found": "the search settled", "most": "its runs were used up", "open": "it was stopped"}
+"""What the words of ``search_state`` say."""
+
 
 def found(dataset: xr.Dataset, asked: Mapping[str, Any]) -> Found:
     """Return the best runs that meet the conditions, and mark the first."""
@@ -20,10 +23,10 @@ def found(dataset: xr.Dataset, asked: Mapping[str, Any]) -> Found:
     except StudyError as error:
         best, warning = [], error.allowed
     names = list(best[0]) if best else []
-    where = "".join(f", {each}" for each in asked["where"])
-    state = dataset["search_state"].item()
+    where = " where " * bool(asked["where"]) + " and ".join(asked["where"])
+    state = _ENDS[dataset["search_state"].item()]
     return Found(
-        about=[f"Least {asked['of']}{where}: {dataset.sizes['point']} runs, {state}."],
+        about=[f"Least {asked['of']}{where}: {dataset.sizes['point']} runs; {state}."],
         warning=warning,
         headings=names,
         units=[unit_of(dataset[name]) for name in names],

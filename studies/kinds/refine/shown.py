@@ -11,13 +11,22 @@ import xarray as xr
 
 from studies.kinds.kind import Found
 from studies.kinds.refine.cells import ERROR
+from studies.kinds.refine.refinement import FAILED, MOST, OPEN, SETTLED, SMALLEST
 from studies.views.columns import unit_of, value_text, words
+
+_STATES = {
+    SETTLED: "settled",
+    FAILED: "in which all runs failed",
+    SMALLEST: "as small as is allowed",
+    MOST: "left when the runs were used up",
+    OPEN: "left when the work was stopped",
+}
 
 
 def found(dataset: xr.Dataset, refine: Mapping[str, Any]) -> Found:
     """Return the errors that a refinement has left in its cells."""
     count = Counter(dataset["cell_state"].to_numpy().astype(str).tolist())
-    states = ", ".join(f"{number} {state}" for state, number in count.most_common())
+    states = ", ".join(f"{number} {_STATES[state]}" for state, number in count.most_common())
     numbers = [n.removeprefix(ERROR) for n in map(str, dataset.data_vars) if ERROR in n]
     rows = []
     for name in numbers:
