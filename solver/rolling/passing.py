@@ -56,9 +56,9 @@ _FLOWS, _RUNS = 0.1, 1.0
 that hardens has no limit load: Newton's method has then diverged."""
 _SOLVES = 10_000
 """Largest number of solves with the stiffness for one pass; a pass takes 50 to 2100."""
-_PATIENCE, _PROGRESS = 14, 0.7
-"""Number of steps, and the share of the residual to which it must fall in them; otherwise the
-search for the pass ends."""
+_PATIENCE, _PATIENT, _PROGRESS = 14, 1500, 0.7
+"""Numbers of steps and of solves, and the share of the residual to which it must fall in them;
+otherwise the search for the pass ends."""
 
 
 class SolveBudget:
@@ -194,7 +194,7 @@ def passing(
         here = at(track.strain(elastic.u), elastic)
     else:
         here = at(guess)
-    first, sizes, shape = here.size, [here.size], here.added.shape
+    course, shape = _Course(here.size, budget.solves), here.added.shape
     for step in range(_STEPS):
         left_over, flow = deviation(here.residual), here.flow
         level = material.yield_stress
@@ -235,17 +235,31 @@ def passing(
         there = searched(moved, here.size)
         most_added = there.flow.most_added
         stalled = krylov == _MOST_KRYLOV and not solved and there.size > _STALLED * here.size
-        unsolved = here.size > _FAR_FROM * first
+        unsolved = here.size > _FAR_FROM * course.sizes[0]
         if most_added > _RUNS or (stalled and unsolved and most_added > _FLOWS):
             raise _diverged(material, most_added)
         if not solved:
             krylov = min(2 * krylov, _MOST_KRYLOV)
         here = there
-        sizes.append(here.size)
-        earlier = min(sizes[:-_PATIENCE], default=np.inf)
-        if unsolved and min(sizes[-_PATIENCE:]) > _PROGRESS * earlier:
+        if course.stuck(here.size, budget.solves) and unsolved:
             break
-    raise NotConverged(f"no steady pass was found in {len(sizes) - 1} steps of Newton's method")
+    raise NotConverged(f"no steady pass was found in {step + 1} steps of Newton's method")
+
+
+class _Course:
+    """The residuals of a search for a pass, and whether they still fall."""
+
+    def __init__(self, size: float, solves: int) -> None:
+        self.sizes, self._reached, self._solves = [size], size, solves
+
+    def stuck(self, size: float, solves: int) -> bool:
+        """Add a residual, known after so many solves, and return whether they fall too slowly."""
+        self.sizes.append(size)
+        if size <= _PROGRESS * self._reached:
+            self._reached, self._solves = size, solves
+        earlier = min(self.sizes[:-_PATIENCE], default=np.inf)
+        slow = min(self.sizes[-_PATIENCE:]) > _PROGRESS * earlier
+        return slow or solves - self._solves > _PATIENT
 
 
 class _Sized(Protocol):
