@@ -11,7 +11,7 @@ import pytest
 
 from solver import SCENES, ModelError, Status
 from solver.errors import NotConverged, TooLong, WindowTooSmall
-from solver.rolling import passing, search
+from solver.rolling import search
 from solver.rolling.audit.plane import audit_pass
 from solver.rolling.passing import SolveBudget
 from solver.rolling.plane.rolling import rolling
@@ -407,14 +407,6 @@ def test_a_pass_that_is_not_found_ends_after_so_many_solves(monkeypatch):
     assert record.message.startswith("no steady pass was found in 30 solves")
     assert record.message.endswith("more hardening it is easier to find")  # not by a finer mesh
     assert {each.solves for each in made} == {30}
-
-
-def test_a_search_whose_residual_does_not_fall_ends():
-    """After 14 steps, or after 1500 solves where each step takes many."""
-    few, many, falling = (passing._Course(1.0, 0) for _ in range(3))
-    assert [few.stuck(0.9, 20 * k) for k in range(1, 16)] == [False] * 13 + [True] * 2
-    assert [many.stuck(0.9, 450 * k) for k in range(1, 5)] == [False] * 3 + [True]
-    assert not any(falling.stuck(0.7**k, 900 * k) for k in range(1, 30))
 
 
 def test_windows_of_all_sizes_share_their_solves(monkeypatch):
