@@ -6,7 +6,7 @@ K.L. Johnson, Contact Mechanics (1985), sections 4.6, 7.1 and 9.2.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+import scipy  # loads scipy.optimize at its first use: few pictures need it
 
 from solver.typing import Array
 
@@ -38,7 +38,7 @@ def largest_shear(friction: float) -> tuple[float, float]:
     def least(depth: float) -> float:
         return -float(np.abs(sliding_contact(_X, depth, friction)[2]).max())
 
-    found = minimize_scalar(least, bounds=(0.05, 1.5), method="bounded")
+    found = scipy.optimize.minimize_scalar(least, bounds=(0.05, 1.5), method="bounded")
     return -float(found.fun), float(found.x)
 
 
@@ -68,9 +68,13 @@ def melan_limit(friction: float, poisson_ratio: float) -> float:
             a, b, c = along + residual[0], across, out + residual[1]
             return float((((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) / 6 + shear**2).max())
 
-        starts = ((0.1, 0.1), (0.5, 0.2))
-        options = {"xatol": 1e-6, "fatol": 1e-9, "maxiter": 4000}
-        return min(float(minimize(largest, start, method="Nelder-Mead", options=options).fun)
-                   for start in starts)  # fmt: skip
+        found = (
+            scipy.optimize.minimize(
+                largest, start, method="Nelder-Mead",
+                options={"xatol": 1e-6, "fatol": 1e-9, "maxiter": 4000},
+            )
+            for start in ((0.1, 0.1), (0.5, 0.2))
+        )  # fmt: skip
+        return min(float(each.fun) for each in found)
 
     return float(1 / np.sqrt(max(least(0.0), least(largest_shear(friction)[1]))))

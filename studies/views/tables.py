@@ -178,11 +178,11 @@ def _own(dataset: xr.Dataset) -> list[str]:
     """Return the outputs that a scene file declares, without places of extremes and derivatives."""
     every = over_runs(dataset)
     names = [name for name, each in every.items() if each.dtype.kind in "fiub"]
-    known = QUANTITIES.keys() | LABEL_ATTRIBUTES.keys()
     parameters = [*_parameters(dataset), *map(str, dataset.coords)]
-    known |= {named(*each) for each in derived(every, parameters)}
-    known |= {*map(reach, parameters)}
+    known = {named(*each) for each in derived(every, parameters)}
+    known |= {*LABEL_ATTRIBUTES, *map(reach, parameters)}
     own = [name for name in names if name not in known and not name.startswith(_AUDIT)]
+    own = [name for name in own if name not in QUANTITIES]
     ends = {f"_{axis}" for axis in AXES}
     return [name for name in own if name[-2:] not in ends or name[:-2] not in own]
 
