@@ -109,7 +109,9 @@ class Discretisation(Nodes, Part):
         """Return the rigid motions (n, n_rigid) that supports leave free, with nodes at x."""
         motions = rigid_motions(x, self.body.kinematics)
         if self._held.any():
-            motions = motions @ linalg.null_space(motions[self._held], rcond=1e-9)
+            # of three columns at most: the left vectors of all rows would take longer than the rest
+            triangle = np.linalg.qr(motions[self._held], mode="r")
+            motions = motions @ linalg.null_space(triangle, rcond=1e-9)
         return motions
 
     def chain(self, boundary: str, any_shape: bool = False) -> Surface:

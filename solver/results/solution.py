@@ -20,6 +20,7 @@ from solver.errors import ModelError
 from solver.fem.nodes import vectors
 from solver.fem.rigid import RigidMotion
 from solver.late import Late
+from solver.linear.solvers import one_thread
 from solver.loading.outcome import Cycle, Tally
 from solver.loading.program import ROUNDING, Control, Lap, PathControl, Program, Stage
 from solver.loading.stepper import Stepper
@@ -307,9 +308,10 @@ def solve(
             raise ModelError("amplitude", body.name, allowed)
     for doubt in model.doubts:
         _LOG.warning("%s", doubt)
-    system = System(model, linear_solver)
+    with one_thread():
+        system = System(model, linear_solver)
+        systems = {name: System(each, linear_solver) for name, each in (beside or {}).items()}
     follow = _IncrementCount(program, progress)
-    systems = {name: System(each, linear_solver) for name, each in (beside or {}).items()}
     program = replace(program, beside=(program,) * len(systems))
     followers = _NeighbouringRuns(system, systems) if systems else None
     ends = partial(decided, laws=system.laws) if until else None

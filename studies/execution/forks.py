@@ -30,6 +30,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
+from solver.late import no_search
 from solver.parts import SETTING, own_files
 from studies.definition.identity import solver_hash
 
@@ -218,10 +219,11 @@ def _serve(pipe: Connection, other: Connection | None, modules: Sequence[str]) -
     if other:
         other.close()
     os.chdir("/")  # no settings of libraries are read where this process was started
-    for module in modules:
-        import_module(module)
-    solver_hash()
-    gc.freeze()
+    with no_search():
+        for module in modules:
+            import_module(module)
+        solver_hash()
+        gc.freeze()
     context: Any = multiprocessing.get_context(_FORKS)
     forks: dict[int, tuple[BaseProcess, Connection]] = {}
     with suppress(EOFError, OSError):
