@@ -11,50 +11,23 @@ import json
 import logging
 from base64 import b64decode
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import partial
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 from service.errors import TooMany
+from service.examined import Examined, examined
 from service.sandbox import CRASHED, FAILED, Answer
 from service.schemas import KeptScene
 from service.settings import Settings
 from service.turns import MINUTE, Share, beyond
 from solver.late import Late
-from solver.scenes import Scene
-from studies.definition.study import Study
 from studies.errors import SceneError, StudyError
-from studies.execution.estimate import Bounds, Estimate, estimate
 from studies.scenes.formats import FORMATS
 from studies.scenes.table import FILE_NAME
 from studies.scratch import scratch
-from studies.storage.store import Store
 
 SECONDS = 120
 """Longest time of the check of a study [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Examined:
-    """A study that may be accepted.
-
-    Attributes
-    ----------
-    study : the checked study
-    runs : ids of its runs in the order of its cases; one that chooses them has none yet
-    estimate : its estimated cost
-    """
-
-    study: Study
-    runs: list[str]
-    estimate: Estimate
-
-    @property
-    def costs(self) -> dict[str, str]:
-        """The cost as text by name."""
-        return self.estimate.costs(self.study.kind.chooses)
 
 
 async def examine(content: Mapping[str, Any], settings: Settings, share: Share) -> Examined:
@@ -72,19 +45,6 @@ async def examine(content: Mapping[str, Any], settings: Settings, share: Share) 
         examined, *what, field="study", name=content.get("name"), seconds=SECONDS,
         advice=": sweep less",
     )  # fmt: skip
-
-
-def examined(content: dict[str, Any], directory: Path, bounds: Bounds) -> Examined:
-    """Return a checked study with its run ids and its cost; called in a separate process."""
-    store = Store(directory)
-
-    def find(name: str) -> Scene | None:
-        return store.scene(store.scene_id(name))
-
-    study = Study.known(content, find, store.definition, partial(bounds.check_count, store))
-    bounds.refuse(runs=study.size)
-    cost = estimate(study.checked(), store, bounds)
-    return Examined(study, list(study.run_ids()), cost)
 
 
 log = logging.getLogger(__name__)

@@ -21,7 +21,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from service.errors import Busy, Conflict, NoRoom, NotFound
-from service.examiner import Examined
+from service.examined import Examined
 from service.job import Job, StudyState
 from service.jobs import Jobs, forget, put
 from studies.errors import FileDamaged

@@ -37,8 +37,9 @@ from solver.files import read_file
 from studies.execution.forks import Forks
 from studies.storage.room import FULL
 
-READERS = Forks(("netCDF4", "service.sandbox", "service.examiner", "service.reading"))
-"""The processes; what a call needs besides is loaded for it and all that follow."""
+READERS = Forks(("service.sandbox", "service.examined"))
+"""The processes; what a call needs besides is loaded for it and all that follow. With xarray they
+would take five times as long to load, and no study needs it to be computed, or its table."""
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
 _NO_NEW_PRIVILEGES = 38

@@ -21,7 +21,8 @@ from service.dependencies import (
     in_turn,
 )
 from service.errors import NoRoom
-from service.examiner import Examined, examine
+from service.examined import Examined
+from service.examiner import examine
 from service.maps import PNG
 from service.pages import form
 from service.pages.rendering import ROOT, PageRoute, page, to_study

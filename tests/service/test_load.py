@@ -29,7 +29,7 @@ from service import metrics
 from service.app import create_app
 from service.connections import limited
 from service.errors import Busy, NoRoom, status_of
-from service.examiner import examined
+from service.examined import examined
 from service.jobs import Jobs
 from service.maps import Pictures
 from service.settings import Settings

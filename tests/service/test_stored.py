@@ -24,7 +24,8 @@ import pytest
 from service import retention
 from service.app import create_app
 from service.errors import Conflict
-from service.examiner import Examined, Inspector
+from service.examined import Examined
+from service.examiner import Inspector
 from service.job import StudyState
 from service.jobs import Jobs
 from service.keys import Keys, KeysError, Scope
