@@ -66,7 +66,9 @@ class Late:
 
     def __call__(self, *given: Any, **named: Any) -> Any:
         """Return the result of the function."""
-        return resolve_name(self.name)(*given, **named)
+        with no_search():
+            function = resolve_name(self.name)
+        return function(*given, **named)
 
 
 def late(module: str, *functions: str) -> tuple[Late, ...]:
