@@ -263,8 +263,9 @@ def _begun(pipe: Connection, context: Any) -> tuple[BaseProcess, Connection]:
     os.environ.clear()
     os.environ.update(environment)
     if module:
-        with suppress(Exception):  # the fork will tell
+        with suppress(Exception), no_search():  # the fork will tell
             import_module(module)
+        gc.freeze()
     given = [pipe, end] if _FORKS == "fork" else [], content, pipes
     fork: BaseProcess = context.Process(target=_call, args=given, name=_NAME)
     fork.start()
