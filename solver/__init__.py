@@ -10,7 +10,7 @@ tension is positive; y points up.
 
 from __future__ import annotations
 
-from solver.late import front, used_late
+from solver.late import front
 from solver.version import __version__ as __version__
 
 _HOMES = {
@@ -56,5 +56,3 @@ __all__ = list(_HOMES)
 
 # A public name is imported when it is first used.
 __getattr__ = front(__name__, _HOMES)
-used_late("numpy.f2py")
-used_late("numpy.testing")

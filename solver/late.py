@@ -1,23 +1,17 @@
-"""Late imports, at first use: public names of a package, functions of a scene, parts of libraries.
+"""Late imports, at first use: public names of a package, functions of a scene.
 
 Scenes are thus listed without importing the modules that compute them.
 """
 
 from __future__ import annotations
 
-import atexit
 import gc
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.util import LazyLoader, find_spec, module_from_spec
 from pkgutil import resolve_name
 from typing import Any
-
-# A search for garbage at the end, among all that libraries have loaded, takes 0.1 to 0.3 s.
-atexit.register(gc.freeze)
 
 
 @contextmanager
@@ -33,20 +27,6 @@ def no_search() -> Iterator[None]:
     finally:
         if searched:
             gc.enable()
-
-
-def used_late(name: str) -> None:
-    """Let a module of a package be loaded when it is first used, by whoever imports it.
-
-    SciPy copies all names of NumPy, and so loads `numpy.f2py` and `numpy.testing` for nothing.
-    """
-    spec = None if name in sys.modules else find_spec(name)
-    if spec is not None and spec.loader is not None:
-        spec.loader = LazyLoader(spec.loader)
-        module = sys.modules[name] = module_from_spec(spec)
-        spec.loader.exec_module(module)
-        package, _, own = name.rpartition(".")
-        setattr(sys.modules[package], own, module)
 
 
 @dataclass(frozen=True)
