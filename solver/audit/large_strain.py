@@ -8,21 +8,30 @@ strain. A theory of large strain differs in two ways.
 2. The strain is logarithmic, E = ln((I + H)'(I + H)) / 2. For a body that rotates, the same linear
    displacements give a stretch in E - e of about half the square of the angle.
 
-The estimate is the smallest stress s with which T + s satisfies both. With the elastic stiffness C,
-the stiffness K of the bodies joined by their links, and their strain operator B,
+The estimate is the stress s with which T + s satisfies both. With the strain operator B of the
+bodies, the tangent D of their points, and their joined stiffness K by D, it grows from a state of
+the path (the end of a stage) to the next by
 
-    s = C (E - e + x + B v),   K v = -f(R N - T) - f(C (E - e + x))
+    ds = D (d(E - e) + B v),   K v = -f(s + R N - T + D d(E - e))
 
-where f are nodal forces. Forces of loads and contact are those of T. The displacements v relax the
-strains that the bodies are free to relax, such as the shortening of a beam that bends. In yielded
-material E - e is left out, and x is the plastic strain with the least energy of s, by conjugate
-gradients; elsewhere x is zero. x does not change the part of s that f(R N - T) causes, which no
-stress with less energy balances. Links that rotate a body by w stretch it by ln(1 + w^2) / 2,
-because its displacements are linear. v removes this stretch: it includes -ln(1 + w^2) / 2 times the
-position relative to the centre of rotation.
+where f are nodal forces, of which v removes those that neither loads, links nor contact balance.
+Loads that follow the boundary, such as a pressure, are those on the deformed one. Links and contact
+respond to v as in an increment: contact may close, open and slip.
 
-The estimated share is the energy norm of s over that of T. If it is larger, the norm of s + N - T
-is used, the change of nominal stress: under prescribed displacements it is the error of forces.
+D is the elastic stiffness, and where plastic strain grew in the last increment the tangent of one
+increment that ends there and has half of the plastic strain p since the state before. A change x of
+p along its direction meets the hardening only. Across it, stress stays parallel to the flow if it
+changes by ``|dev T| dx/d|p|``. What small strain neglects grows with the square of the deformation,
+so x as the square of p: dx/d|p| = 2 x / |p|. Flow has the stiffness ``2 |dev T| / |p|`` across p,
+in series with the elastic one: that of such an increment by the backward Euler method.
+
+Links that rotate a body by w stretch it by ln(1 + w^2) / 2, because its displacements are linear. v
+removes this stretch: it includes -ln(1 + w^2) / 2 times the position relative to the centre of
+rotation.
+
+The estimated share is the energy norm of s over that of T, the largest so far. If it is larger, the
+norm of s + N - T is used, the change of nominal stress: under prescribed displacements it is the
+error of forces.
 
 C. Miehe, N. Apel, M. Lambrecht, Comput. Methods Appl. Mech. Engrg 191 (2002) 5383-5425: plasticity
 in the space of logarithmic strain.
@@ -38,10 +47,12 @@ import numpy as np
 
 from solver.audit.plain import GHOST, LEAST, PlainBody
 from solver.audit.theory import Neglected
-from solver.contact.candidates import no_candidates
+from solver.contact.candidates import find_candidates, no_candidates
 from solver.contact.state import Converged, State
 from solver.contact.system import System
+from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation
+from solver.fem.large import following
 from solver.fem.rigid import RigidPart, turning
 from solver.fem.substructure import Substructure
 from solver.linear.schur import Eliminated
@@ -54,10 +65,9 @@ _FEW = 0.01
 """Elastic energy of a body, over that of all bodies: errors refer to at least this energy."""
 _FAINT = 1e-5
 """Tensile stress over Young's modulus: errors refer to at least the energy of this stress."""
-_SURE = 0.01
-"""Estimate up to which plastic strain is not computed: it can only reduce the estimate."""
-_STEPS, _SETTLED = 20, 1e-5
-"""Most conjugate gradients. Energy of the residual over that of the stress: they end below it."""
+_STIFF = 1e-5
+"""Least stiffness of points that flow, over the elastic one: without hardening a body may be a
+mechanism, which rounding moves. A tenth of it, or ten times as much, change estimates by 2 %."""
 _FLAT = 1e-6
 """Least stretch; inverted elements count as flat."""
 
@@ -65,13 +75,27 @@ _FLAT = 1e-6
 def large_strain(
     system: System, plain: Sequence[PlainBody], states: Iterable[Converged]
 ) -> Neglected:
-    """Return the largest estimate of a body in some states of a system.
+    """Return the largest estimate of a body in the states of a path.
 
     Bodies of large strain neglect nothing; next to others they respond as their elastic stiffness.
     """
     if all(body.body.large for body in plain):
         return Neglected()
-    return _largest(_in_state(system, plain, state) for state in states)
+    found = Neglected()
+    bodies: Sequence[_Deformed | None] = [None] * len(plain)
+    turned = np.zeros(len(system.links))
+    for converged in sorted(states, key=_flowed):
+        each = zip(plain, bodies, strict=True)
+        bodies = now = [_Deformed(system, body, converged, before) for body, before in each]
+        back, turned = turned, _turned(system, converged.state)
+        _add(system, converged, now, turned - back)
+        found = _largest([found, _worst(now, LEAST**2 * converged.energy.scale)])
+    return found
+
+
+def _flowed(converged: Converged) -> float:
+    """Return the sum of accumulated plastic strain: it orders a path, but where nothing flows."""
+    return float(sum(plastic.accumulated.sum() for plastic in converged.state.plastic))
 
 
 def _largest(each: Iterable[Neglected]) -> Neglected:
@@ -104,25 +128,11 @@ def of_material(
     return _neglected(math.sqrt(changed / own) if own else 0.0, body)
 
 
-def _in_state(system: System, plain: Sequence[PlainBody], converged: Converged) -> Neglected:
-    bodies = [_Deformed(system, body, converged) for body in plain]
-    joined, least = _Joined(system, converged, bodies), LEAST**2 * converged.energy.scale
-    added = joined.stress(joined.strain, [each.force for each in bodies])
-    found = _worst(bodies, joined.each(added), least)
-    if found.share > _SURE and joined.yielded.any():
-        found = _worst(bodies, joined.each(added + joined.relaxing()), least)
-    return found
-
-
-def _worst(bodies: Sequence[_Deformed], added: Sequence[Array], least: float) -> Neglected:
+def _worst(bodies: Sequence[_Deformed], least: float) -> Neglected:
     """Return the largest norm of added stress over that of the stress, of all bodies."""
-    own = [each.energy(each.stress) for each in bodies]
-    least = max(_FEW * sum(own), least)
-    changed = [
-        max(body.energy(s), body.energy(s + body.nominal))
-        for body, s in zip(bodies, added, strict=True)
-    ]
-    levels = [max(T, least, body.faint) for body, T in zip(bodies, own, strict=True)]
+    least = max(_FEW * sum(body.most for body in bodies), least)
+    changed = [max(b.energy(b.added), b.energy(b.added + b.nominal)) for b in bodies]
+    levels = [max(body.most, least, body.faint) for body in bodies]
     ratios = [
         _neglected(math.sqrt(energy / level), body.name)
         for body, energy, level in zip(bodies, changed, levels, strict=True)
@@ -137,43 +147,83 @@ class _Deformed:
     Attributes
     ----------
     stress : T (4, n_points), Mandel [MPa]
+    added : s (4, n_points), Mandel, at first that of the state ``before`` [MPa]
     nominal : N - T (4, n_points), Mandel [MPa]
-    force : nodal forces (n,) of R N - T [N]
-    yielded : (n_points,) whether the material has yielded
-    strain : E - e (4, n_points), Mandel, zero where it has yielded
+    force : nodal forces (n,) of R N - T, less the change of loads that follow the boundary [N]
+    strain : E - e (4, n_points), Mandel
+    since : its change since the state ``before``
     volume : (n_points,) volume of the points [mm3], zero near singular points and where removed
+    most : elastic energy of T, the largest so far [N mm]
+    accumulated : (n_points,) accumulated plastic strain
+    tangent : response of points that flow, with their tangent; None if none does
     """
 
-    def __init__(self, system: System, plain: PlainBody, converged: Converged) -> None:
+    def __init__(
+        self, system: System, plain: PlainBody, converged: Converged, before: _Deformed | None
+    ) -> None:
         self.name, state = plain.body.name, converged.state
         self.number, self.part = system.part(self.name), plain.part
-        self.elasticity, self.stiffness = plain.body.law.elasticity, plain.body.law.stiffness(4)
+        self.elasticity, self._stiffness = plain.body.law.elasticity, plain.body.law.stiffness(4)
         if isinstance(system.parts[self.number], Discretisation):
             self.stress, _, plastic, _ = converged.responses[self.number]
         else:
             found = system.state(self.name, converged)
             self.stress, plastic = found.stress, found.plastic
-        self.yielded = plastic.accumulated > 0
+        self.accumulated = plastic.accumulated
         counts = plain.remaining(state.time) > GHOST
         for point in system.model.singular:
             counts &= ~point.reaches(plain.points)
         counts &= not plain.body.large
         self.volume = np.where(counts, plain.volume.ravel(), 0.0)
+        self.added: Array = np.zeros_like(self.stress) if before is None else before.added
+        self.most: float = max(self.energy(self.stress), 0.0 if before is None else before.most)
+        self.tangent: PartResponse | None = None
         if plain.body.large:
             self.force = np.zeros(self.part.n)
-            self.nominal = self.strain = np.zeros_like(self.stress)
+            self.nominal = self.strain = self.since = np.zeros_like(self.stress)
             return
 
-        H, hoop = plain.gradient(system.displacement(self.name, state))
+        u = system.displacement(self.name, state)
+        H, hoop = plain.gradient(u)
         T = plain.level(self.stress.reshape(4, *hoop.shape))
         e = _mandel((H + H.swapaxes(0, 1)) / 2, hoop)
         change = _nominal(T, e)
         R = turning(np.arctan2(H[1, 0] - H[0, 1], 2 + H[0, 0] + H[1, 1]))
         turned = _product(R, _matrix(T + change)[:2, :2]) - _matrix(T)[:2, :2]
         self.force = plain.nominal_forces(turned, change[2]).ravel()
+        for load in following(self.part):
+            self.force -= load.change(u, state.time)
         self.nominal = change.reshape(4, -1)
         change = _mandel(_logarithm(H), np.log(np.maximum(1 + hoop, _FLAT))) - e
-        self.strain = np.where(~counts | self.yielded, 0.0, plain.level(change).reshape(4, -1))
+        self.strain = np.where(counts, plain.level(change).reshape(4, -1), 0.0)
+        self.since = self.strain if before is None else self.strain - before.strain
+        if not plain.body.material.elastic:
+            earlier = 0.0 if before is None else before.accumulated
+            self._flow(converged, self.accumulated - earlier)
+
+    def _flow(self, converged: Converged, grown: Array) -> None:
+        """Set the tangent of points that flow, with one increment over half of their flow.
+
+        ``grown`` (n_points,) is the plastic strain accumulated since the state before.
+        """
+        state, u = converged.state, converged.state.u[self.number]
+        now, last = (each.plastic[self.number] for each in (state, converged.start))
+        least = now.accumulated - last.accumulated
+        flows = least > 0
+        if not flows.any():
+            return
+        back = np.divide(np.maximum(grown / 2, least), least, out=np.zeros_like(least), where=flows)
+        half = now.unpacked(now.packed - back * (now.packed - last.packed))
+        found = self.part.respond(u, half, state.time)
+        C = self._stiffness[:, :, None]
+        D = np.where(flows, found.law.tangent + _STIFF * (C - found.law.tangent), C)
+        self.tangent = found._replace(law=found.law._replace(tangent=D, yielding=flows))
+
+    def stressed(self, strain: Array) -> Array:
+        """Return the stress (4, n_points) of a small change of strain [MPa]."""
+        if self.tangent is None:
+            return self._stiffness @ strain
+        return np.einsum("abp,bp->ap", self.tangent.law.tangent, strain)
 
     @property
     def faint(self) -> float:
@@ -185,77 +235,39 @@ class _Deformed:
         return float(self.elasticity.energy_density(stress) @ self.volume)
 
 
-class _Joined:
-    """The elastic bodies of a system, joined by their links, under the changes by large strain.
+def _add(system: System, converged: Converged, bodies: Sequence[_Deformed], motion: Array) -> None:
+    """Add the stress since the state before: bodies, links and contact respond as in an increment.
 
-    Points are those of all bodies, one after the other: strain (4, n_points), yielded (n_points,).
+    ``motion`` (c,) is what linked boundaries move by besides, see `_turned` [mm].
     """
-
-    def __init__(self, system: System, converged: Converged, bodies: Sequence[_Deformed]) -> None:
-        self._system, self._bodies = system.during(converged.start), bodies
-        state = converged.state
-        apart = no_candidates(self._system, state.u, np.zeros_like(state.links))
-        self._links = replace(apart, motion=-_turned(self._system, state))
-        self._ends = np.cumsum([len(each.yielded) for each in bodies])
-        self.yielded = np.concatenate([each.yielded for each in bodies])
-        self.strain = np.hstack([each.strain for each in bodies])
-
-    def each(self, values: Array) -> list[Array]:
-        """Return the values (..., n_points) of each body."""
-        return np.split(values, self._ends[:-1], axis=-1)
-
-    def stress(
-        self, strain: Array, forces: Sequence[Array] | None = None, *, turned: bool = True
-    ) -> Array:
-        """Return the stress (4, n_points) that an eigenstrain and nodal forces cause [MPa].
-
-        ``forces`` (n,) of each body act with the opposite sign. If ``turned``, linked boundaries
-        also move by the motions of `_turned`.
-        """
-        parts, strains = self._system.parts, self.each(strain)
-        own, begun = [np.zeros(part.n) for part in parts], []
-        for k, (body, each) in enumerate(zip(self._bodies, strains, strict=True)):
-            force = -body.part.undeformed.internal_force(body.stiffness @ each)
-            part, force = parts[body.number], force if forces is None else force - forces[k]
-            condensed = part.begin(force) if isinstance(part, Substructure) else None
-            begun.append(condensed or Eliminated(force, lambda u: u))
-            own[body.number] = begun[-1].condensed
-        operators = [each.elastic for each in self._system.operators]
-        links = self._links
-        links = links if turned else replace(links, motion=np.zeros_like(links.motion))
-        step = newton_step(self._system, tuple(own), operators, links)
-        if step is None:  # stress is not finite
-            return np.full_like(strain, np.nan)
-        return np.hstack(
-            [
-                body.stiffness @ (each + body.part.strain(back.finish(step.u[body.number])))
-                for body, back, each in zip(self._bodies, begun, strains, strict=True)
-            ]
-        )
-
-    def relaxing(self) -> Array:
-        """Return the stress of the plastic strain x with which the energy of s is least [MPa].
-
-        It is found by conjugate gradients. The stress of x balances itself, so the energy of s is
-        least if that of the stress of ``E - e + x`` is least. The elastic strain of the residual is
-        the preconditioned gradient.
-        """
-        given = self.stress(self.strain)
-        made, way, last = np.zeros_like(given), np.zeros_like(given), np.inf
-        level = _SETTLED * sum(2 * each.energy(each.stress) for each in self._bodies)
-        volumes = np.concatenate([each.part.volumes for each in self._bodies])
-        for _ in range(_STEPS):
-            residual = np.where(self.yielded, -(given + made), 0.0)
-            elastic = zip(self._bodies, self.each(residual), strict=True)
-            down = np.hstack([body.elasticity.strain(r) for body, r in elastic])
-            now = float((residual * down).sum(axis=0) @ volumes)
-            if not now > level:
-                break
-            way = down + now / last * way
-            along = self.stress(way, turned=False)
-            made += now / float((way * along).sum(axis=0) @ volumes) * along
-            last = now
-        return made
+    state, start = converged.state, converged.start
+    system = system.during(start)
+    own, begun = [np.zeros(part.n) for part in system.parts], list[Eliminated]()
+    for body in bodies:
+        body.added = body.added + body.stressed(body.since)
+        force = -body.force - body.part.undeformed.internal_force(body.added)
+        part = system.parts[body.number]
+        condensed = part.begin(force) if isinstance(part, Substructure) else None
+        begun.append(condensed or Eliminated(force, lambda u: u))
+        own[body.number] = begun[-1].condensed
+    flows = {body.number: body.tangent for body in bodies}
+    operators = [
+        inverse.tangent(flow, 0.0) if (flow := flows.get(k)) else inverse.elastic
+        for k, inverse in enumerate(system.operators)
+    ]
+    path = state.contacts, state.links, state.time - start.time
+    kept = no_candidates(system, state.u, state.links)
+    touching = kept if converged.separated else find_candidates(system, start, state.u, *path)
+    step = None
+    for each in (touching, kept):  # contact forces are kept where no others balance the change
+        change = each.motion.copy()
+        change[each.linked] -= motion
+        here = replace(each, motion=change, turning=None)
+        forces = tuple(force - here.all_on_part(k, here.forces) for k, force in enumerate(own))
+        step = step or newton_step(system, forces, operators, here, state.time)
+    for body, back in zip(bodies, begun, strict=True):
+        u = back.finish(step.u[body.number]) if step else np.full(body.part.n, np.nan)
+        body.added = body.added + body.stressed(body.part.strain(u))
 
 
 def _turned(system: System, state: State) -> Array:

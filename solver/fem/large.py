@@ -38,7 +38,7 @@ def _shapes(x: Array) -> Array:
     return np.asarray((turn * area).min(axis=0) / (ahead**2).sum(axis=0).max(axis=0))
 
 
-class _Follower:
+class Follower:
     """The forces of a load that follows a boundary.
 
     Attributes
@@ -96,6 +96,12 @@ class _Follower:
                              self._at[:, None, :]), K)  # fmt: skip
 
 
+def following(part: Discretisation) -> list[Follower]:
+    """Return the loads that follow the boundaries of a body if its strain is large."""
+    loads = [load for load in part.body.every_load if load.follows and not load.moves]
+    return [Follower(part, load, boundary) for load in loads for boundary in load.boundaries]
+
+
 class LargeDiscretisation(Discretisation):
     """Unknowns, quadrature and operators of a body of large strain."""
 
@@ -103,9 +109,8 @@ class LargeDiscretisation(Discretisation):
     """Angle [rad] of the last of its rigid motions, if it is a rotation."""
 
     @cached_property
-    def _following(self) -> list[_Follower]:
-        loads = [load for load in self.body.every_load if load.follows]
-        return [_Follower(self, load, b) for load in loads for b in load.boundaries]
+    def _following(self) -> list[Follower]:
+        return following(self)
 
     def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Deformation:
         g = gradient_operator(values, gradients, self.points[0], self.body.kinematics)
