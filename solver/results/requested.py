@@ -33,6 +33,9 @@ _COURSES = {
 """Variables over increments, with units, by the names in requests."""
 _UNITS = {name: field.units for name, field in BODY_FIELDS.items()} | _OF_PAIR
 EXTREME = ("maximum", "minimum")
+_SAME = 1e-9
+"""Relative difference from an extreme up to which a value shares it: of its places the first is
+named, not one that rounding chooses."""
 FORCES = ("pressure", "shear")
 """Fields of a contact whose integral is a force, over the area instead of along the surface."""
 OF_CONTACT = tuple(_OF_PAIR)
@@ -197,8 +200,11 @@ class RequestedNumber:
         if not known.any():
             return (np.nan,) * (1 + len(X) if self.take in EXTREME else 1)
         if self.take in EXTREME:
-            k = int((np.nanargmax if self.take == "maximum" else np.nanargmin)(values))
-            return float(values[k]), *X[:, k].tolist()
+            sign = 1.0 if self.take == "maximum" else -1.0
+            heights = np.where(known, sign * values, -np.inf)
+            most = heights.max()
+            k = int((heights >= most - _SAME * abs(most)).argmax())
+            return float(sign * most), *X[:, k].tolist()
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X), axis=0))])
         values = np.where(known, values, 0.0)
         if self.take == "integral":
