@@ -232,7 +232,7 @@ class AuditedPair:
             n=len(self.normal),
             find_strength=lambda: self.measured.strength,
             find_plastic_strain=lambda: self._system.plastic_strain(self._number, self._start),
-            find_slip=lambda: self._start.contacts[self._number].slipped,
+            find_slip=lambda: self._start.contacts[self._number].slipped[0],
         )
         return lines_of(self._pair.law, places).over(self.measured.area).least(self.normal)
 

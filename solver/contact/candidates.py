@@ -219,10 +219,12 @@ class Candidates(OnParts):
         after = self.states(before, self.forces, self.status)
         moved = np.abs(self.motion[self.along]) if self.frictional else np.zeros(self.n)
         moved, out = np.where(self.status == OPEN, 0.0, moved), []
+        rubbed = np.abs(self.forces[self.along]) if self.frictional else moved
+        added = moved * np.stack([np.ones(self.n), self.forces[: self.n], rubbed])
         each = zip(before, after, self.vertices, self.places, self.gaps, self.slips, strict=True)
         for old, new, at, here, gap, slip in each:
             slipped = old.slipped.copy()
-            slipped[at] += moved[here]
+            slipped[:, at] += added[:, here]
             with np.errstate(invalid="ignore", divide="ignore"):
                 rates = np.stack([gap - old.gap, slip]) / span
                 earlier = np.stack([old.gap, old.earlier[0], old.rates[1] / old.rates[0]])

@@ -26,7 +26,8 @@ class ContactState:
     earlier : (3, n) gaps at the beginning of the last increment and of the one before, and slip
         over change of the gap in the latter; NaN unless contact grew in both
     finite : whether the surfaces are paired in their current positions, or always as before loading
-    slipped : (n,) accumulated length of slip in contact since the first increment [mm]
+    slipped : (3, n) accumulated since the first increment, while in contact: length of slip [mm],
+        normal force and friction over it [N mm]
     """
 
     normal: Array
@@ -53,7 +54,7 @@ class ContactState:
         It keeps the accumulated slip of the state ``before``.
         """
         n = len(touching)
-        slipped = np.zeros(n) if before is None else before.slipped
+        slipped = np.zeros((3, n)) if before is None else before.slipped
         status = np.where(touching, STICK, OPEN)
         rates, earlier = np.full((2, n), np.nan), np.full((3, n), np.nan)
         nothing = np.zeros(n), np.zeros(n)

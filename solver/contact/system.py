@@ -364,7 +364,7 @@ class System:
                 n=len(pairing.gap),
                 find_strength=lambda: interface.strength(pairing, time),
                 find_plastic_strain=lambda: self.plastic_strain(pair, start),
-                find_slip=lambda: contact.slipped,
+                find_slip=lambda: contact.slipped[0],
             ),
         )
 
@@ -423,7 +423,15 @@ class System:
         return found
 
     def pressure(self, state: State, pair: int) -> tuple[Array, Array]:
-        """Return pressure and shear on the slave's vertices (n,) [MPa]: means under each hat.
+        """Return pressure and shear on the slave's vertices (n,) [MPa]: see `under_hats`."""
+        contact, pairing = state.contacts[pair], self.pairing(state, pair)
+        normal, tangential = (
+            self.under_hats(force, pairing, pair) for force in (contact.normal, contact.tangential)
+        )
+        return normal, tangential
+
+    def under_hats(self, force: Array, pairing: Pairing, pair: int) -> Array:
+        """Return forces (n,) on the slave's vertices over the area: means under each hat (n,).
 
         The multiplier field is piecewise linear where the slave faces the master, and zero
         elsewhere. Its means under the hats have the same resultant as its values at the vertices,
@@ -433,18 +441,12 @@ class System:
 
         The area is that before loading, as the small strains of the slave imply.
         """
-        contact, hats = state.contacts[pair], self.interfaces[pair].slave_surface.hats
-        pairing = self.pairing(state, pair)
-
-        def mean(force: Array) -> Array:
-            area = pairing.area
-            each = np.divide(force, area, out=np.zeros_like(force), where=area > 0)
-            # hats sum to one: one of two neighbours gains in the integrals what the other loses
-            gained = pairing.shared * np.diff(each)
-            integral = force + np.append(gained, 0.0) - np.append(0.0, gained)
-            return np.divide(integral, hats, out=np.zeros_like(force), where=hats > 0)
-
-        return mean(contact.normal), mean(contact.tangential)
+        area, hats = pairing.area, self.interfaces[pair].slave_surface.hats
+        each = np.divide(force, area, out=np.zeros_like(force), where=area > 0)
+        # hats sum to one: one of two neighbours gains in the integrals what the other loses
+        gained = pairing.shared * np.diff(each)
+        integral = force + np.append(gained, 0.0) - np.append(0.0, gained)
+        return np.divide(integral, hats, out=np.zeros_like(force), where=hats > 0)
 
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return a sampler of nodal fields of a body at positions (2, n) [mm]."""

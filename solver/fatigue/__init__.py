@@ -16,8 +16,7 @@ _HOMES = {
     "Crossland": "crossland", "DangVan": "dang_van", "Findley": "findley", "Matake": "matake",
     "FatemiSocie": "fatemi_socie", "SmithWatsonTopper": "smith_watson_topper",
     "BrownMiller": "brown_miller",
-    "stress_intensity": "cracks", "opened_range": "cracks", "held_length": "cracks",
-    "archard_depth": "wear", "slip_work": "wear", "ruiz": "wear",
+    "stress_intensity": "cracks", "opened_range": "cracks", "arrest": "cracks",
     "surface_index": "rolling", "subsurface_index": "rolling", "t_gamma": "rolling",
     "crack_damage": "rolling",
 }  # fmt: skip

@@ -46,14 +46,26 @@ def opened_range(largest: Array, smallest: Array) -> Array:
     return np.maximum(largest, 0.0) - np.maximum(smallest, 0.0)
 
 
-def held_length(lengths: Array, opened: Array, threshold: float) -> float:
-    """Return the length at which a crack that grows stops: NaN if it never does.
+def arrest(lengths: Array, opened: Array, threshold: float, initial: float) -> tuple[float, float]:
+    """Return the length at which a crack that grows stops, NaN if it never does; smallest range.
+
+    Both are of the lengths before the first whose range is not known.
 
     Parameters
     ----------
     lengths : (n,) increasing [mm]
-    opened : (n,) range of K in which it is open [MPa sqrt(mm)]
+    opened : (n,) range of K in which it is open, linear in between [MPa sqrt(mm)]
     threshold : range below which a crack does not grow
+    initial : its length at the beginning
     """
-    held = np.flatnonzero(np.asarray(opened) < threshold)
-    return float(lengths[held[0]]) if held.size else np.nan
+    longer = lengths > initial
+    first = np.interp(initial, lengths, opened, right=np.nan)
+    grown, each = np.append(initial, lengths[longer]), np.append(first, opened[longer])
+    known = each[: np.isnan(np.append(each, np.nan)).argmax()]
+    if not known.size:
+        return np.nan, np.nan
+    if known.min() >= threshold:
+        return np.nan, float(known.min())
+    k = int((known < threshold).argmax())
+    around = slice(max(k - 1, 0), k + 1)
+    return float(np.interp(-threshold, -known[around], grown[around])), float(known.min())

@@ -78,6 +78,11 @@ class Sampler:
     Parameters
     ----------
     x : (2, n) positions before deformation [mm]
+
+    Attributes
+    ----------
+    inside : (n,) whether a position is inside the body
+    matrix : (n, n_nodes) from nodal values to those at the positions; zero outside
     """
 
     def __init__(self, part: Nodes, x: Array) -> None:
@@ -88,7 +93,7 @@ class Sampler:
         values = np.array([shape(local, i)[0] for i in range(len(nodes))])
         self.inside = np.zeros(x.shape[1], dtype=bool)
         self.inside[point] = True
-        self._matrix = sparse.csr_array(
+        self.matrix = sparse.csr_array(
             (values.ravel(), (np.broadcast_to(point, nodes.shape).ravel(), nodes.ravel())),
             shape=(x.shape[1], part.X.shape[1]),
         )
@@ -97,9 +102,9 @@ class Sampler:
         """Return values (..., n) of nodal fields (..., n_nodes)."""
         flat = np.atleast_2d(nodal).reshape(-1, nodal.shape[-1])
         unknown = np.isnan(flat)
-        out = (self._matrix @ np.where(unknown, 0.0, flat).T).T
+        out = (self.matrix @ np.where(unknown, 0.0, flat).T).T
         if unknown.any():
-            out[(abs(self._matrix) @ unknown.astype(float).T).T > _KNOWN] = np.nan
+            out[(abs(self.matrix) @ unknown.astype(float).T).T > _KNOWN] = np.nan
         out[:, ~self.inside] = np.nan
         return np.asarray(out.reshape(*nodal.shape[:-1], len(self.inside)))
 

@@ -27,6 +27,7 @@ from solver.results.fields import Passed, StressCycle
 from solver.results.quantities import along_axes, declare, declare_along, placed
 from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import CLOSED, QUIET
+from solver.results.surface_crack import SurfaceCrack
 from solver.results.view import Places
 from solver.tensors import AXES, to_tensor
 from solver.typing import Array, Bools
@@ -75,25 +76,27 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fatigue:
-    """An output: a fatigue criterion on the cycle of a run.
+    """An output: a fatigue criterion and a surface crack in the cycle of a run.
 
     Attributes
     ----------
-    criterion : the criterion with its constants
+    criterion : the criterion with its constants, if one is asked for
     cycle : stages of the cycle; empty for all of a run in their order
     residual : whether stress that remains after release counts; without, it is subtracted
-    bodies : bodies that are assessed; empty for all
+    bodies : bodies that are assessed by the criterion; empty for all
+    crack : the crack, if one is asked for
     """
 
-    criterion: Criterion
+    criterion: Criterion | None
     cycle: tuple[str, ...] = ()
     residual: bool = True
     bodies: tuple[str, ...] = ()
+    crack: SurfaceCrack | None = None
 
     @classmethod
     def of(
-        cls, criterion: str, limits: Mapping[str, Any], cycle: tuple[str, ...] = (),
-        residual: bool = True, bodies: tuple[str, ...] = (),
+        cls, criterion: str | None, limits: Mapping[str, Any],
+        crack: Mapping[str, Any] | None = None, **more: Any,
     ) -> Fatigue:  # fmt: skip
         """Return the output of a table.
 
@@ -102,6 +105,11 @@ class Fatigue:
         ModelError
             if there is no such criterion, or it has other constants
         """
+        held = None if crack is None else SurfaceCrack(**crack)
+        if criterion is None:
+            if held is None or limits:
+                raise ModelError("criterion", None, "must be given, or crack alone")
+            return cls(criterion=None, crack=held, **more)
         part, known = CRITERIA[criterion], CRITERIA.declared_by(criterion)
         for name in limits:
             if name not in known:
@@ -114,16 +122,22 @@ class Fatigue:
             made = part(**limits)
         except ModelError as error:
             raise ModelError(f"limits.{error.field}", error.value, error.allowed) from None
-        return cls(criterion=made, cycle=cycle, residual=residual, bodies=bodies)
+        return cls(criterion=made, crack=held, **more)
 
     def __call__(self, run: FinishedRun, lines: Mapping[str, Places] | None = None) -> Values:
         """Return the quantities of a run."""
-        of_body = {name: self._assessed(run, name) for name in self.bodies or run.system.names}
+        values: dict[Any, Any] = {}
+        if self.crack is not None:
+            cycle = self._cycle(run, run.view.profile_body)
+            values |= self.crack.values(run, cycle, _strained(cycle)[1])
+        if self.criterion is None:
+            return values
+        names = self.bodies or run.system.names
+        of_body = {name: self._assessed(run, name, self.criterion) for name in names}
         nodal = {
             name: run.samples.fields.recovered(name, each.found.utilisation)
             for name, each in of_body.items()
         }
-        values: dict[Any, Any] = {}
         across, up = run.view.map_axes
         if all(grid.size for grid in run.view.map_grid):
             values[MAP_UTILISATION.at(up, across)] = run.samples.nodal_on_map(nodal)
@@ -165,18 +179,16 @@ class Fatigue:
             **dict(zip(PLANE, (found.plane[k] * hidden).tolist(), strict=True)),
         }
 
-    def _assessed(self, run: FinishedRun, name: str) -> _OfBody:
+    def _assessed(self, run: FinishedRun, name: str, criterion: Criterion) -> _OfBody:
         cycle = self._cycle(run, name)
-        known = np.asarray(np.isfinite(cycle.stress).all(axis=(1, 2)))
-        most = np.ptp(cycle.strain[known], axis=1).max(initial=0.0)
-        void = known & (cycle.grown > QUIET * most)
-        if self.criterion.yielding:
+        known, void = _strained(cycle)
+        if criterion.yielding:
             void &= cycle.net > CLOSED * cycle.grown
         asked = known & ~void
         value, used = np.full(len(known), np.nan), np.full(len(known), np.nan)
         plane = np.full((len(known), 3), np.nan)
         if asked.any():
-            found = self.criterion.assess(Paths(cycle.stress[asked], cycle.strain[asked]))
+            found = criterion.assess(Paths(cycle.stress[asked], cycle.strain[asked]))
             value[asked], used[asked], plane[asked] = found
         of = cycle.of
         return _OfBody(Assessment(value[of], used[of], plane[of]), void[of], cycle)
@@ -209,6 +221,13 @@ class Fatigue:
             stress=cycle.stress - to_tensor(after.stress[:, first]).T[:, None],
             strain=cycle.strain - to_tensor(after.strain[:, first]).T[:, None],
         )
+
+
+def _strained(cycle: StressCycle) -> tuple[Bools, Bools]:
+    """Return which cycles (n,) are known, and which of these strain plastically."""
+    known = np.asarray(np.isfinite(cycle.stress).all(axis=(1, 2)))
+    most = np.ptp(cycle.strain[known], axis=1).max(initial=0.0)
+    return known, known & (cycle.grown > QUIET * most)
 
 
 class _OfBody(NamedTuple):

@@ -40,7 +40,7 @@ MODULES = tuple(
     f"solver.results.{module}"
     for module in (
         "contact", "cracks", "fatigue", "figures", "increments", "indentation", "maps", "places",
-        "singularity", "wear",
+        "singularity", "surface_crack", "wear",
     )
 )  # fmt: skip
 """Modules that define outputs of scene files, or quantities of these."""

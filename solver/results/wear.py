@@ -1,7 +1,8 @@
-"""Wear and slip of the contact pairs of a run, between two of its stages."""
+"""Wear, slip and fretting of the contact pairs of a run, between two of its stages."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import MISSING, dataclass
 from typing import Annotated, Any
 
@@ -9,26 +10,34 @@ import numpy as np
 from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
-from solver.fatigue.wear import archard_depth
 from solver.parameters import Checked, described
-from solver.results.acting import contact_result
 from solver.results.outputs import output
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
+from solver.typing import Array
 
 WEAR_DEPTH = declare("wear_depth", "largest depth worn by Archard's law between two stages", "mm")
 SLIP_LENGTH = declare(
     "slip_length", "longest way that a point in contact slides between two stages", "mm"
 )
+SLIP_WORK = declare(
+    "slip_work", "largest work of friction per area of the slave between two stages", "N/mm"
+)
+SLIP_SHARE = declare("slip_share", "share of the area in contact that slides between two stages")
+FRETTING = declare(
+    "fretting_parameter", "largest tension along the slave times its work of friction, by Ruiz",
+    "MPa^2 mm",
+)  # fmt: skip
+_SLIPS = 1e-6
+"""Way over the longest one, above which a point slides."""
 
 
 @output("wear", "contact")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wear(Checked):
-    """Wear depth of the slave by Archard's law, and length of slip, between two stages.
+    """Wear of the slave by Archard's law, length of slip, and fretting between two stages.
 
-    The way that a point slides is the sum over the increments. Pressure is the mean of the states
-    at the ends of stages, between which it should change little or in proportion to slip.
+    All are sums over the increments. A point is in contact if it is so at the end of a stage.
     """
 
     since: str = described(MISSING, "stage from whose end on it counts")
@@ -38,17 +47,50 @@ class Wear(Checked):
     )
 
     def __call__(self, run: FinishedRun) -> Values:
-        """Return the quantities of a run."""
+        """Return the quantities of a run.
+
+        References
+        ----------
+        J.F. Archard, J. Appl. Phys. 24 (1953) 981-988; C. Ruiz, P.H.B. Boddington, K.C. Chen, Exp.
+        Mech. 24 (1984) 208-217.
+        """
         system: Any = run.system
         names, points = list(run.view.stages), run.outcome.points
         first, last = (names.index(each) for each in (self.since, self.until))
         if first >= last:
             raise ModelError("results.wear.until", self.until, f"must come after {self.since}")
         states = [points[name] for name in names[first : last + 1]]
-        depth = length = 0.0
-        for k in range(len(system.interfaces)):
-            pressure = np.array([contact_result(system, each, k).pressure for each in states])
-            slipped = np.array([each.state.contacts[k].slipped for each in states])
-            depth = max(depth, archard_depth(pressure, slipped, self.coefficient).max())
-            length = max(length, (slipped[-1] - slipped[0]).max())
-        return {WEAR_DEPTH: float(depth), SLIP_LENGTH: float(length)}
+        each = [_of_pair(run, k, states) for k in range(len(system.interfaces))]
+        way, pressed, work, area, closed, tension = map(np.concatenate, zip(*each, strict=True))
+        touching = float(area[closed].sum())
+        slides = closed & (way > _SLIPS * way.max())
+        return {
+            WEAR_DEPTH: float(self.coefficient * pressed.max()),
+            SLIP_LENGTH: float(way.max()),
+            SLIP_WORK: float(work.max()),
+            SLIP_SHARE: float(area[slides].sum()) / touching if touching else np.nan,
+            FRETTING: float((tension * work).max()),
+        }
+
+
+def _of_pair(run: FinishedRun, pair: int, states: Sequence[Any]) -> tuple[Array, ...]:
+    """Return of the vertices of a slave, each (n,), what lies between the states.
+
+    It is the way [mm], pressure and friction over it [N/mm], area [mm2], whether they are in
+    contact, and the largest tension along the surface [MPa].
+    """
+    system: Any = run.system
+    interface, contacts = system.interfaces[pair], [at.state.contacts[pair] for at in states]
+    chain, (body, _) = interface.slave_surface, interface.declared.slave
+    way, *forces = contacts[-1].slipped - contacts[0].slipped
+    pairing = system.pairing(states[-1].state, pair)
+    nodes, (x, y) = chain.nodes[chain.vertices], chain.normals[:, chain.vertices]
+    stresses = [run.samples.fields.at_nodes(at, body).stress[:, nodes] for at in states]
+    tension = [y**2 * xx + x**2 * yy - 2 * x * y * xy for xx, yy, _, xy, *_ in stresses]
+    return (
+        way,
+        *(system.under_hats(force, pairing, pair) for force in forces),
+        chain.hats,
+        np.any([contact.normal > 0 for contact in contacts], axis=0),
+        np.max(tension, axis=0, initial=0.0),
+    )

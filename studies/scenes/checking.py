@@ -21,7 +21,7 @@ from studies.scenes import tables
 from studies.scenes.arithmetic import is_expression
 from studies.scenes.description import LARGEST
 from studies.scenes.names import RESERVED, in_use
-from studies.scenes.results import fatigue_of
+from studies.scenes.results import fatigue_of, view_of
 
 NO_FILE = "there is no such file beside the scene, or posted with it as meshes"
 
@@ -52,7 +52,7 @@ def _fatigue(scene: tables.SceneFile) -> Iterator[StudyError]:
     for body in scene.fatigue.bodies:
         yield from _one_of("fatigue.bodies", body, scene.bodies)
     try:
-        fatigue_of(scene.fatigue, scene.stage_names, scene.released)
+        fatigue_of(scene.fatigue, view_of(scene))
     except ModelError as error:
         yield StudyError(f"fatigue.{error.field}", error.value, error.allowed)
 

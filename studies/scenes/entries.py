@@ -35,8 +35,7 @@ def assessed(scene: Scene, table: Any) -> Scene:
     """
 
     def with_output(checked: FatigueTable, source: str) -> Scene:
-        view = scene.view(scene.parameters())
-        made = fatigue_of(checked, view.stages, view.unloaded)
+        made = fatigue_of(checked, scene.view(scene.parameters()))
         others = [each for each in scene.outputs if not isinstance(each, Fatigue)]
         return replace(scene, outputs=(*others, made), source=source)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -76,7 +75,7 @@ def output_of(scene: tables.SceneFile, word: str) -> Output:
     return output.make(**getattr(scene.results, word).model_dump())
 
 
-def fatigue_of(table: tables.FatigueTable, stages: Sequence[str], released: str) -> Fatigue:
+def fatigue_of(table: tables.FatigueTable, view: View) -> Fatigue:
     """Return the output of the table ``fatigue``.
 
     Raises
@@ -84,11 +83,17 @@ def fatigue_of(table: tables.FatigueTable, stages: Sequence[str], released: str)
     ModelError
         for an entry that is wrong
     """
-    if other := [stage for stage in table.cycle if stage not in stages]:
-        raise ModelError("cycle", other[0], f"must be one of {', '.join(stages)}")
-    if not table.residual and not released:
+    if other := [stage for stage in table.cycle if stage not in view.stages]:
+        raise ModelError("cycle", other[0], f"must be one of {', '.join(view.stages)}")
+    if not table.residual and not view.unloaded:
         raise ModelError("residual", False, "needs a last stage that releases the bodies")
-    return Fatigue.of(**table.model_dump())
+    made, depth = Fatigue.of(**table.model_dump()), view.depth
+    if table.crack and (not depth.size or depth[0] != 0.0):
+        raise ModelError("crack", "given", "needs results.profile with a depth from 0 on")
+    if table.crack and table.crack.initial >= depth[-1]:
+        allowed = f"must be less than the depth of profiles, {depth[-1]:g} mm"
+        raise ModelError("crack.initial", table.crack.initial, allowed)
+    return made
 
 
 def places(line: tables.LineResultTable, samples: int) -> Array:

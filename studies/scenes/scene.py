@@ -192,7 +192,7 @@ def _at_places(description: Description, run: FinishedRun) -> Values:
 def _fatigue(description: Description, run: FinishedRun) -> Values:
     table = _tables(description, run.parameters).fatigue
     assert table is not None
-    made = fatigue_of(table, run.view.stages, run.view.unloaded)
+    made = fatigue_of(table, run.view)
     return made(run, _places(description, run.parameters).lines)
 
 

@@ -350,18 +350,28 @@ class RepeatTable(SceneTable):
     until: Literal["shaken_down"] | None = None
 
 
+class SurfaceCrackTable(SceneTable):
+    """A crack straight down from the surface; see `solver.results.surface_crack.SurfaceCrack`."""
+
+    threshold: Annotated[float, Interval(gt=0.0), Unit("MPa mm^0.5")]
+    initial: Length
+    at: Coordinate | None = None
+    across: bool = False
+
+
 class FatigueTable(SceneTable):
-    """A fatigue criterion with its constants, on the cycle that runs repeat.
+    """A fatigue criterion with its constants, or a crack, in the cycle that runs repeat.
 
     ``cycle`` names its stages, by default all in their order; a pass over a body without ends is a
     cycle of its own. Without ``residual`` the stress that remains after release is subtracted.
     """
 
-    criterion: str
+    criterion: str | None = None
     limits: dict[Label, float] = Field(default_factory=dict)
     cycle: tuple[Label, ...] = ()
     residual: bool = True
     bodies: tuple[Label, ...] = ()
+    crack: SurfaceCrackTable | None = None
 
 
 class DerivativesTable(SceneTable):

@@ -35,6 +35,8 @@ FIGURES: Mapping[str, str] = {
     "peak_contact_pressure": "peak contact pressure",
     "wear_depth": "wear depth",
     "slip_length": "slip length",
+    "slip_share": "share that slips",
+    "crack_arrest_depth": "crack held at depth",
     "K_I": "K I {tip} {stage}",
     "K_II": "K II {tip} {stage}",
     "max_plastic_strain": "largest plastic strain",

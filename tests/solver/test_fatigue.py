@@ -21,12 +21,9 @@ from solver.fatigue import (
     Paths,
     PlaneCriterion,
     SmithWatsonTopper,
-    archard_depth,
+    arrest,
     crack_damage,
-    held_length,
     opened_range,
-    ruiz,
-    slip_work,
     stress_intensity,
     subsurface_index,
     surface_index,
@@ -435,19 +432,34 @@ def test_a_residual_compression_closes_a_crack_and_holds_it() -> None:
     opened = opened_range(largest, smallest)
     assert (smallest <= 1e-9).all() and opened[0] == pytest.approx(largest[0])
     assert opened[-1] == 0.0 and largest[-1] < 0
-    assert 0.2 < held_length(a, opened, 20.0) < 0.6
-    assert np.isnan(held_length(a, stress_intensity(depth, load, a), 20.0))
+    stop, least = arrest(a, opened, 20.0, 0.1)
+    assert 0.2 < stop < 0.6 and least == 0.0
+    assert np.interp(stop, a, opened) == pytest.approx(20.0)
+    alone = stress_intensity(depth, load, a)
+    stop, least = arrest(a, alone, 20.0, 0.1)
+    assert np.isnan(stop) and least == pytest.approx(np.interp(0.1, a, alone))
     with pytest.raises(ModelError, match="lengths"):
         stress_intensity(depth, load, np.array([4.0]))
 
 
-def test_wear_and_fretting_are_integrals_over_a_cycle() -> None:
-    """100 MPa that slides .02 mm forth and back, with friction of .3 against it."""
-    slip = np.array([[0.0], [0.02], [0.0]])
-    pressure, shear = np.full((3, 1), 100.0), 30 * np.array([[-1.0], [1.0], [-1.0]])
-    assert archard_depth(pressure, slip, 1e-7)[0] == pytest.approx(1e-7 * 100 * 0.04)
-    assert slip_work(shear, slip)[0] == pytest.approx(30 * 0.04)
-    assert ruiz(np.array([[50.0], [-80.0], [0.0]]), shear, slip)[0] == pytest.approx(50 * 30 * 0.02)
+@pytest.mark.parametrize(
+    ("initial", "opened", "expected"),
+    [
+        (1.0, [0, 9, 7, 3, 8], (2.5, 3)),  # 5 lies halfway from 7 to 3
+        (2.5, [0, 9, 7, 3, 8], (2.5, 3)),  # begins at the threshold, then falls
+        (2.75, [0, 9, 7, 3, 8], (2.75, 3)),  # never grows
+        (3.5, [0, 9, 7, 3, 8], (np.nan, 5.5)),  # grows past where it would be held
+        (1.0, [0, 9, 7, np.nan, 1], (np.nan, 7)),  # not known before it stops
+        (1.0, [0, 9, 4, np.nan, 9], (1.8, 4)),  # stops before
+        (3.5, [0, 9, 7, np.nan, 1], (np.nan, np.nan)),
+        (5.0, [0, 9, 7, 3, 8], (np.nan, np.nan)),  # longer than the profile
+    ],
+)
+def test_a_crack_stops_at_the_first_known_length_below_the_threshold(
+    initial: float, opened: list[float], expected: tuple[float, float]
+) -> None:
+    found = arrest(np.arange(5.0), np.array(opened, dtype=float), 5.0, initial)
+    assert found == pytest.approx(expected, nan_ok=True)
 
 
 def test_rolling_indices_have_their_limits_where_the_sources_have_them() -> None:

@@ -163,6 +163,106 @@ def test_a_ball_that_rolls_is_as_an_independent_integral() -> None:
     np.testing.assert_allclose(found, value.utilisation, rtol=0.02)
 
 
+CRACK = {"threshold": 50.0, "initial": 0.2}
+UP = {
+    "left": ({"x": [0.0, 8.0], "y": [-4.0, 4.0]}, {"right": "x", "bottom": "y"}, "top", "y"),
+    "top": ({"x": [-4.0, 4.0], "y": [-8.0, 0.0]}, {"left": "x", "bottom": "y"}, "right", "x"),
+}
+"""Blocks with a free side, along which they are pulled: they keep a stress along it."""
+
+
+def held_block(side: str, **changed: Any) -> Any:
+    """Return the record of a block with -60 - 20 depth along its free side, pulled by 100 MPa."""
+    opened, depth = ("xx", "-y") if side == "top" else ("yy", "x")
+    box, supports, boundary, axis = UP[side]
+    content: dict[str, Any] = {
+        "name": "held",
+        "materials": {"steel": {"youngs_modulus": 2e5, "poisson_ratio": 0.3}},
+        "bodies": {"block": {
+            "material": "steel", "supports": supports,
+            "shape": {"kind": "rectangle", **box, "size": 0.5},
+        }},
+        "loads": [
+            {"body": "block", "kind": "initial_stress", opened: f"-60 - 20*({depth})", "zz": -100},
+            {"body": "block", "kind": "displacement", "boundary": boundary,
+             axis: 100 * 8.0 * (1 - 0.3**2) / 2e5, "amplitude": {"left": 0.0, "pulled": 1.0}},
+        ],
+        "stages": [{"name": "left"}, {"name": "pulled"}],
+        "results": {
+            "profile": {"body": "block", "depth": {"start": 0.0, "stop": 6.0, "num": 241}},
+            "axis": {"along": [1.0, 0.0] if side == "top" else [0.0, 1.0]},
+        },
+        "fatigue": {"crack": CRACK | changed},
+    }  # fmt: skip
+    scene = built(content)
+    (record,) = scene.path(scene.parameters(), [], lambda done: None)
+    assert record.status.name == "OK", record.message
+    return record
+
+
+@pytest.mark.solves
+@pytest.mark.parametrize("side", UP)
+def test_a_crack_in_constant_and_linear_stress_is_a_closed_form(side: str) -> None:
+    """1.1215 and .4390 of it where the stress falls to zero at the tip (Tada, Paris, Irwin)."""
+    record = held_block(side)
+    depth = record.coordinates["depth"]
+    largest, smallest, opened = (
+        record.fields[f"crack_K_{name}"] for name in ("largest", "smallest", "range")
+    )
+    assert largest[0] == ("depth",)
+    unit, falling = np.sqrt(np.pi * depth), (1.1215 - 0.4390) * 20 * depth
+    np.testing.assert_allclose(smallest[1], (-60 * 1.1215 - falling) * unit, rtol=5e-3)
+    np.testing.assert_allclose(largest[1], (40 * 1.1215 - falling) * unit, rtol=5e-3, atol=0.2)
+    np.testing.assert_array_equal(opened[1], np.maximum(largest[1], 0.0))
+    stop = record.scalars["crack_arrest_depth"]
+    a = np.linspace(0.2, 6.0, 10_001)
+    exact = (40 * 1.1215 - (1.1215 - 0.4390) * 20 * a) * np.sqrt(np.pi * a)
+    assert exact.max() > CRACK["threshold"]
+    assert exact[0] < CRACK["threshold"] and stop == CRACK["initial"], "it does not grow"
+    grows = held_block(side, initial=1.0).scalars
+    last = a[(exact >= CRACK["threshold"]).nonzero()[0][-1]]
+    assert 1.0 < last and grows["crack_arrest_depth"] == pytest.approx(last, rel=5e-3)
+    assert grows["crack_least_range"] == 0.0
+    across = held_block(side, across=True).fields["crack_K_smallest"][1]
+    np.testing.assert_allclose(across, -100 * 1.1215 * unit, rtol=2e-4)
+
+
+def below_hertz(x: np.ndarray, z: np.ndarray, a: float, f: float) -> np.ndarray:
+    """Return xx over p0 at depths z under a Hertz pressure with sliding friction f.
+
+    K.L. Johnson, Contact Mechanics (1985), section 4.2 and eqs. 7.5.
+    """
+    apart = a**2 - x**2 + z**2
+    whole = np.sqrt(apart**2 + 4 * x**2 * z**2)
+    m, n = np.sqrt((whole + apart) / 2), np.sign(x) * np.sqrt((whole - apart) / 2)
+    by_pressure = m * (1 + (z**2 + n**2) / (m**2 + n**2)) - 2 * z
+    by_shear = n * (2 - (z**2 - m**2) / (m**2 + n**2)) - 2 * x
+    return np.asarray((f * by_shear - by_pressure) / a)
+
+
+@pytest.mark.solves
+def test_a_crack_that_a_contact_passes_is_as_by_another_weight_function() -> None:
+    """H.F. Bueckner, Z. angew. Math. Mech. 50 (1970) 529-546, .8 % above for constant stress."""
+    crack = {"crack": {"threshold": 100.0, "initial": 0.1}}
+    f, ratio = 0.3, 0.5
+    record = record_of(rolled(crack, load_ratio=ratio, friction=f, traction=1.0))
+    a, depth = record.parameters.half_width, record.coordinates["depth"]
+    u, weight = (each / 2 for each in np.polynomial.legendre.leggauss(200))
+    u = u + 0.5
+    for length in np.array([0.25, 0.5, 1.0, 2.0]) * a:
+        x, z = np.meshgrid(np.linspace(-40, 40, 20_001) * a, length * (1 - u**2), indexing="ij")
+        stress = 400 * ratio * below_hertz(x, z, a, f)
+        by_place = np.sqrt(8 * length / np.pi) * (1 + 0.6147 * u**2 + 0.2502 * u**4)
+        K = (stress * by_place) @ weight
+        found = {
+            name: np.interp(length, depth, record.fields[f"crack_K_{name}"][1])
+            for name in ("largest", "smallest", "range")
+        }
+        assert K.max() > 10.0 > K.min(), "it opens and closes"
+        assert found["largest"] == found["range"] == pytest.approx(K.max(), rel=0.02)
+        assert found["smallest"] == pytest.approx(K.min(), rel=0.02)
+
+
 def test_studies_without_the_table_are_as_before() -> None:
     """Their scene is the same object; with it, run and study have ids of their own."""
     plain, asked = rolled(None), rolled(DANG_VAN)
@@ -184,6 +284,12 @@ def test_studies_without_the_table_are_as_before() -> None:
         ("fatigue.limits.torsion", {"criterion": "dang_van", "limits": {"torsion": -3.0}}),
         ("fatigue.cycle", DANG_VAN | {"cycle": ["nowhere"]}),
         ("fatigue.cyclic", DANG_VAN | {"cyclic": True}),
+        ("fatigue.criterion", {"bodies": []}),
+        ("fatigue.criterion", {"crack": CRACK, "limits": {"torsion": 300.0}}),
+        ("fatigue.crack.threshold", {"crack": {"initial": 0.1}}),
+        ("fatigue.crack.threshold", {"crack": {"initial": 0.1, "threshold": "3 MPa"}}),
+        ("fatigue.crack.initial", {"crack": {"initial": 0.0, "threshold": 3.0}}),
+        ("fatigue.crack.depth", {"crack": CRACK | {"depth": 1.0}}),
     ],
 )
 def test_mistakes_name_their_entry(field: str, table: Any) -> None:

@@ -82,7 +82,7 @@ def records() -> list[Record]:
         name = names[label]
         scene = scene_named(name)
         if name in ("ball", "raceway"):
-            scene = assessed(scene, FATIGUE)
+            scene = assessed(scene, FATIGUE | {"crack": {"threshold": 100.0, "initial": 0.01}})
         found += scene.path(scene.parameters(**parameters), [value], lambda fraction: None)
     for own in (FILES[0], *(assessed(own, FATIGUE) for own in FILES[1:])):
         found += own.path(

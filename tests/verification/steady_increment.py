@@ -157,7 +157,7 @@ class SteadyIncrement:
             rates=np.stack([closing, np.where(faces, slip, np.nan)]),
             earlier=np.full((3, len(slip)), np.nan),
             finite=interface.finite,
-            slipped=np.zeros_like(slip),
+            slipped=np.zeros((3, len(slip))),
         )
 
     def solve(self, *, from_touch: bool) -> Converged:

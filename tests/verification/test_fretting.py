@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -91,3 +93,30 @@ def test_wear_and_slip_are_those_of_half_a_cycle(record: Record) -> None:
     assert found["wear_depth"] == pytest.approx(2e-8 * (pressure * slip).max(), rel=0.02)
     inside = curve.slip(np.array([curve.half_width - 0.036]), amplitude)[0]
     assert inside < found["slip_length"] / 2 < slip.max()
+    work = 2 * curve.friction * pressure * slip
+    assert found["slip_work"] == pytest.approx(work.max(), rel=0.02)
+    share = 1 - curve.stick_width(amplitude) / curve.half_width
+    assert found["slip_share"] == pytest.approx(share, abs=0.03)
+
+
+def test_fretting_does_not_depend_on_the_slave_but_by_its_tension(
+    record: Record, tmp_path: Path
+) -> None:
+    """The half-plane as the slave; its tension is also that of the line along its surface.
+
+    The largest parameter lies inside the last two elements, where pressure falls to zero.
+    """
+    changed("fretting.toml", "increments = 8", "increments = 2", tmp_path)
+    scene = tmp_path / "fretting.toml"
+    sides = 'slave = "pad.bottom"\nmaster = "half_plane.top"'
+    text = scene.read_text()
+    assert sides in text
+    scene.write_text(text.replace(sides, 'slave = "half_plane.top"\nmaster = "pad.bottom"'))
+    other = fretting(element=0.036, folder=tmp_path)
+    for name in ("wear_depth", "slip_work", "slip_share"):
+        assert other.scalars[name] == pytest.approx(record.scalars[name], rel=0.03), name
+    (_, push), (_, back) = forces(record, "pushed"), forces(record, "back")
+    curve, x = cattaneo(record, "pushed"), other.fields["line_x"][1][0]
+    work = 2 * curve.friction * curve.pressure(x) * curve.slip(x, (push - back) / 2)
+    tension = other.fields["line_stress"][1][0, 1:3, 0].max(axis=0)
+    assert other.scalars["fretting_parameter"] == pytest.approx((tension * work).max(), rel=0.25)

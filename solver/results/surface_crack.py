@@ -1,0 +1,67 @@
+"""A crack from the surface into a body of a run: its stress intensity over depth in a cycle.
+
+It is long and straight down, in the stress of the body without it. Where this is not known, or
+the cycle strains plastically, K of a crack that reaches there is NaN.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from solver.fatigue.cracks import arrest, opened_range, stress_intensity
+from solver.results.fields import StressCycle
+from solver.results.quantities import declare
+from solver.results.run import FinishedRun, Values
+from solver.typing import Bools
+
+_UNIT = "MPa mm^0.5"
+LARGEST, SMALLEST, OPENED = (
+    declare(f"crack_K_{name}", f"{words} of a crack down to the depth", _UNIT, dims=("depth",))
+    for name, words in {
+        "largest": "largest stress intensity in a cycle",
+        "smallest": "smallest stress intensity in a cycle",
+        "range": "range of stress intensity in a cycle while open,",
+    }.items()
+)
+ARREST = declare("crack_arrest_depth", "depth at which a crack that grows stops", "mm")
+LEAST = declare("crack_least_range", "smallest range of stress intensity as a crack grows", _UNIT)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceCrack:
+    """A crack from the surface of the body of the profiles, straight down.
+
+    Attributes
+    ----------
+    threshold : range of K below which it does not grow [MPa mm^0.5]
+    initial : its depth at the beginning [mm]
+    at : position along the surface; None for the middle one of the profiles [mm]
+    across : whether stress across the plane (in space, across the track) opens it, not stress along
+        the surface (along the track)
+    """
+
+    threshold: float
+    initial: float
+    at: float | None = None
+    across: bool = False
+
+    def values(self, run: FinishedRun, cycle: StressCycle, void: Bools) -> Values:
+        """Return the quantities of a run; ``void`` are cycles (n,) for which K does not hold."""
+        view, body = run.view, run.view.profile_body
+        at = view.station[len(view.station) // 2] if self.at is None else self.at
+        sampler = run.system.sampler(body, replace(view, station=np.array([at])).profiles)
+        cycle_of = np.arange(len(cycle.of)), cycle.of
+        which = csr_array((np.ones(len(cycle.of)), cycle_of))
+        across, up = (1.0, 0.0) if len(view.axis.along) == 3 else view.axis.along
+        of_components = [0, 0, 1, 0] if self.across else [across**2, up**2, 0, 2 * across * up]
+        normal = np.where(void[:, None], np.nan, cycle.stress[..., :4] @ of_components)
+        stress = (sampler.matrix @ run.samples.fields.recovery(body) @ which @ normal).T
+        stress[:, ~sampler.inside] = np.nan
+        K = np.pad(stress_intensity(view.depth, stress, view.depth[1:]), ((0, 0), (1, 0)))
+        largest, smallest = K.max(axis=0), K.min(axis=0)
+        opened = opened_range(largest, smallest)
+        stop, least = arrest(view.depth, opened, self.threshold, self.initial)
+        return {LARGEST: largest, SMALLEST: smallest, OPENED: opened, ARREST: stop, LEAST: least}
