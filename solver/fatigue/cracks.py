@@ -46,26 +46,21 @@ def opened_range(largest: Array, smallest: Array) -> Array:
     return np.maximum(largest, 0.0) - np.maximum(smallest, 0.0)
 
 
-def arrest(lengths: Array, opened: Array, threshold: float, initial: float) -> tuple[float, float]:
+def arrest(lengths: Array, opened: Array, threshold: float) -> tuple[float, float]:
     """Return the length at which a crack that grows stops, NaN if it never does; smallest range.
 
     Both are of the lengths before the first whose range is not known.
 
     Parameters
     ----------
-    lengths : (n,) increasing [mm]
+    lengths : (n,) increasing, from the initial one on [mm]
     opened : (n,) range of K in which it is open, linear in between [MPa sqrt(mm)]
     threshold : range below which a crack does not grow
-    initial : its length at the beginning
     """
-    longer = lengths > initial
-    first = np.interp(initial, lengths, opened, right=np.nan)
-    grown, each = np.append(initial, lengths[longer]), np.append(first, opened[longer])
-    known = each[: np.isnan(np.append(each, np.nan)).argmax()]
-    if not known.size:
-        return np.nan, np.nan
-    if known.min() >= threshold:
-        return np.nan, float(known.min())
+    known = opened[: np.isnan(np.append(opened, np.nan)).argmax()]
+    least = float(known.min()) if known.size else np.nan
+    if not least < threshold:
+        return np.nan, least
     k = int((known < threshold).argmax())
     around = slice(max(k - 1, 0), k + 1)
-    return float(np.interp(-threshold, -known[around], grown[around])), float(known.min())
+    return float(np.interp(-threshold, -known[around], lengths[around])), least

@@ -18,16 +18,12 @@ from solver.results.run import FinishedRun, Values
 from solver.typing import Bools
 
 _UNIT = "MPa mm^0.5"
-LARGEST, SMALLEST, OPENED = (
-    declare(f"crack_K_{name}", f"{words} of a crack down to the depth", _UNIT, dims=("depth",))
-    for name, words in {
-        "largest": "largest stress intensity in a cycle",
-        "smallest": "smallest stress intensity in a cycle",
-        "range": "range of stress intensity in a cycle while open,",
-    }.items()
+LINES = tuple(
+    declare(f"crack_K_{name}", f"{name}{of} K of a surface crack", _UNIT, dims=("depth",))
+    for name, of in {"largest": "", "smallest": "", "range": " of open"}.items()
 )
 ARREST = declare("crack_arrest_depth", "depth at which a crack that grows stops", "mm")
-LEAST = declare("crack_least_range", "smallest range of stress intensity as a crack grows", _UNIT)
+LEAST = declare("crack_least_range", "smallest range of K as a crack grows", _UNIT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,8 +56,11 @@ class SurfaceCrack:
         normal = np.where(void[:, None], np.nan, cycle.stress[..., :4] @ of_components)
         stress = (sampler.matrix @ run.samples.fields.recovery(body) @ which @ normal).T
         stress[:, ~sampler.inside] = np.nan
-        K = np.pad(stress_intensity(view.depth, stress, view.depth[1:]), ((0, 0), (1, 0)))
+        lengths = np.append(self.initial, view.depth[1:])
+        K = stress_intensity(view.depth, stress, lengths)
         largest, smallest = K.max(axis=0), K.min(axis=0)
-        opened = opened_range(largest, smallest)
-        stop, least = arrest(view.depth, opened, self.threshold, self.initial)
-        return {LARGEST: largest, SMALLEST: smallest, OPENED: opened, ARREST: stop, LEAST: least}
+        opened, grown = opened_range(largest, smallest), lengths >= self.initial
+        stop, least = arrest(lengths[grown], opened[grown], self.threshold)
+        surface = 0.0 * stress[:, 0].max()  # not known if the stress there is not
+        lines = (np.append(surface, each[1:]) for each in (largest, smallest, opened))
+        return {**dict(zip(LINES, lines, strict=True)), ARREST: stop, LEAST: least}

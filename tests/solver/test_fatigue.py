@@ -432,33 +432,32 @@ def test_a_residual_compression_closes_a_crack_and_holds_it() -> None:
     opened = opened_range(largest, smallest)
     assert (smallest <= 1e-9).all() and opened[0] == pytest.approx(largest[0])
     assert opened[-1] == 0.0 and largest[-1] < 0
-    stop, least = arrest(a, opened, 20.0, 0.1)
+    stop, least = arrest(a, opened, 20.0)
     assert 0.2 < stop < 0.6 and least == 0.0
     assert np.interp(stop, a, opened) == pytest.approx(20.0)
     alone = stress_intensity(depth, load, a)
-    stop, least = arrest(a, alone, 20.0, 0.1)
-    assert np.isnan(stop) and least == pytest.approx(np.interp(0.1, a, alone))
+    stop, least = arrest(a, alone, 20.0)
+    assert np.isnan(stop) and least == alone[0]
     with pytest.raises(ModelError, match="lengths"):
         stress_intensity(depth, load, np.array([4.0]))
 
 
 @pytest.mark.parametrize(
-    ("initial", "opened", "expected"),
+    ("opened", "expected"),
     [
-        (1.0, [0, 9, 7, 3, 8], (2.5, 3)),  # 5 lies halfway from 7 to 3
-        (2.5, [0, 9, 7, 3, 8], (2.5, 3)),  # begins at the threshold, then falls
-        (2.75, [0, 9, 7, 3, 8], (2.75, 3)),  # never grows
-        (3.5, [0, 9, 7, 3, 8], (np.nan, 5.5)),  # grows past where it would be held
-        (1.0, [0, 9, 7, np.nan, 1], (np.nan, 7)),  # not known before it stops
-        (1.0, [0, 9, 4, np.nan, 9], (1.8, 4)),  # stops before
-        (3.5, [0, 9, 7, np.nan, 1], (np.nan, np.nan)),
-        (5.0, [0, 9, 7, 3, 8], (np.nan, np.nan)),  # longer than the profile
+        ([9, 7, 3, 8], (2.5, 3)),  # 5 lies halfway from 7 to 3
+        ([5, 4, 8, 8], (1.0, 4)),  # begins at the threshold, then falls
+        ([4, 9, 3, 8], (1.0, 3)),  # never grows
+        ([9, 7, 8, 5], (np.nan, 5)),  # never stops
+        ([9, 7, np.nan, 1], (np.nan, 7)),  # not known before it stops
+        ([9, 4, np.nan, 9], (1.8, 4)),  # stops before
+        ([np.nan, 7, 1, 1], (np.nan, np.nan)),
     ],
 )
 def test_a_crack_stops_at_the_first_known_length_below_the_threshold(
-    initial: float, opened: list[float], expected: tuple[float, float]
+    opened: list[float], expected: tuple[float, float]
 ) -> None:
-    found = arrest(np.arange(5.0), np.array(opened, dtype=float), 5.0, initial)
+    found = arrest(np.arange(1.0, 5.0), np.array(opened, dtype=float), 5.0)
     assert found == pytest.approx(expected, nan_ok=True)
 
 
