@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.fatigue import DangVan, Findley, Paths
+from solver.fatigue import DangVan, Findley, Paths, stress_intensity
 from solver.results.fatigue import Applies
 from studies import Study, StudyError, to_dataframe
 from studies.scenes.entries import assessed
@@ -147,7 +147,8 @@ def test_a_ball_that_rolls_is_as_an_independent_integral() -> None:
         "friction": 0.0,
         "hardening": "kinematic",
     }
-    content = {"name": "ball", "scene": "raceway", "parameters": parameters, "fatigue": DANG_VAN}
+    fatigue = DANG_VAN | {"crack": CRACK | {"at": 0.0}}
+    content = {"name": "ball", "scene": "raceway", "parameters": parameters, "fatigue": fatigue}
     record = record_of(Study.from_dict(content))
     s = record.scalars
     a, b, p0 = s["hertz_a"], s["hertz_b"], s["hertz_pressure"]
@@ -161,6 +162,13 @@ def test_a_ball_that_rolls_is_as_an_independent_integral() -> None:
     profile = profiles[len(profiles) // 2]
     found = np.interp(depth, record.coordinates["depth"], profile)
     np.testing.assert_allclose(found, value.utilisation, rtol=0.02)
+    down = np.linspace(1e-3, 1.0, 61) * a
+    X = np.stack([0 * down, -down, 0 * down], axis=1)
+    along, across = boussinesq(X, a, p0).T[[0, 2]]
+    np.testing.assert_allclose(along, across, rtol=1e-6)
+    (expected,) = stress_intensity(down, along, np.array([0.6 * a]))
+    found = np.interp(0.6 * a, record.coordinates["depth"], record.fields["crack_K_smallest"][1])
+    assert found == pytest.approx(expected, rel=0.02)
 
 
 CRACK = {"threshold": 50.0, "initial": 0.2}
