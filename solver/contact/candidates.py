@@ -11,7 +11,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from solver.contact.geometry import Pairing
+from solver.contact.geometry import Cover, Pairing
 from solver.contact.links import Links
 from solver.contact.problem import OPEN, ContactRows, OnParts, joined
 from solver.contact.state import ContactState, State
@@ -49,6 +49,7 @@ class Candidates(OnParts):
     rows : for each part, the derivatives of all conditions; None without contact surface or link
     turned : for each part, the derivatives (n, n_rigid) of gaps by its rigid motions
     covered : for each interface, the share of each candidate's hat function that faces the master
+    covers : for each interface, where its slave faces the master
     gaps, slips : for each interface, gap and slip of all its vertices [mm]; the gap is inf where no
         master faces them, the slip 0 without friction
     beyond : smallest gap of the vertices that are not candidates [mm]
@@ -70,6 +71,7 @@ class Candidates(OnParts):
     rows: tuple[ContactRows | None, ...]
     turned: tuple[Array, ...]
     covered: tuple[Array, ...]
+    covers: tuple[Cover, ...]
     gaps: tuple[Array, ...]
     slips: tuple[Array, ...]
     beyond: float
@@ -219,12 +221,13 @@ class Candidates(OnParts):
         after = self.states(before, self.forces, self.status)
         moved = np.abs(self.motion[self.along]) if self.frictional else np.zeros(self.n)
         moved, out = np.where(self.status == OPEN, 0.0, moved), []
-        rubbed = np.abs(self.forces[self.along]) if self.frictional else moved
-        added = moved * np.stack([np.ones(self.n), self.forces[: self.n], rubbed])
-        each = zip(before, after, self.vertices, self.places, self.gaps, self.slips, strict=True)
-        for old, new, at, here, gap, slip in each:
+        each = zip(
+            before, after, self.vertices, self.places, self.covers, self.gaps, self.slips,
+            strict=True,
+        )  # fmt: skip
+        for old, new, at, here, cover, gap, slip in each:
             slipped = old.slipped.copy()
-            slipped[:, at] += added[:, here]
+            slipped[:, at] += moved[here] * _over_way(old, new, cover)[:, at]
             with np.errstate(invalid="ignore", divide="ignore"):
                 rates = np.stack([gap - old.gap, slip]) / span
                 earlier = np.stack([old.gap, old.earlier[0], old.rates[1] / old.rates[0]])
@@ -233,6 +236,19 @@ class Candidates(OnParts):
             past = {"gap": gap, "rates": rates, "earlier": earlier}
             out.append(replace(new, touching=new.status != OPEN, slipped=slipped, **past))
         return tuple(out)
+
+
+def _over_way(old: ContactState, new: ContactState, cover: Cover) -> Array:
+    """Return 1, and what acts over the slip in an increment (3, n): normal force and friction [N].
+
+    It is the mean normal force. What slides reaches its friction bound, in the end and on the way:
+    friction is that of the end in the ratio of this mean to the normal force of the end.
+    """
+    mean = (old.normal + new.normal) / 2
+    share = np.divide(mean, new.normal, out=np.ones_like(mean), where=new.normal > 0)
+    return np.stack([
+        np.ones_like(mean), cover.spread(mean), np.abs(cover.spread(share * new.tangential))
+    ])  # fmt: skip
 
 
 def _places(vertices: Sequence[Ints]) -> list[slice]:
@@ -247,6 +263,10 @@ def no_candidates(system: System, u: tuple[Array, ...], links: Array) -> Candida
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
     rows = system.links.rows
     covered = tuple(empty for _ in system.interfaces)
+    covers = tuple(
+        Cover(np.zeros(len(i.slave_surface.edges) + 1), np.zeros(len(i.slave_surface.edges)))
+        for i in system.interfaces
+    )
     gaps = tuple(np.full(len(i.slave_surface.edges) + 1, np.inf) for i in system.interfaces)
     slips = tuple(map(np.zeros_like, gaps))
     status = empty.astype(int)
@@ -254,7 +274,8 @@ def no_candidates(system: System, u: tuple[Array, ...], links: Array) -> Candida
     pushes = tuple(np.zeros(part.n) for part in system.parts)
     turned = tuple(np.zeros((0, part.rigid.shape[1])) for part in system.parts)
     return Candidates(
-        none, lines, off, empty, links, status, empty, rows, turned, covered, gaps, slips, np.inf,
+        none, lines, off, empty, links, status, empty, rows, turned, covered, covers, gaps,
+        slips, np.inf,
         leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
         links=system.links,
     )  # fmt: skip
@@ -355,6 +376,7 @@ def find_candidates(
         rows=acting,
         turned=tuple(turned),
         covered=tuple(p.covered[v] for p, v in zip(pairings, vertices, strict=True)),
+        covers=tuple(p.cover for p in pairings),
         gaps=tuple(p.gap for p in pairings),
         slips=tuple(slips),
         beyond=float(beyond),

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,6 +60,23 @@ class Points:
     shares: Array
 
 
+class Cover(NamedTuple):
+    """Where a slave faces its master: ``area`` and ``shared`` of a `Pairing`."""
+
+    area: Array
+    shared: Array
+
+    def spread(self, force: Array) -> Array:
+        """Return the integrals (n,) under the hats of the field of which ``force`` are forces [N].
+
+        The field is piecewise linear where the slave faces the master, and zero elsewhere.
+        """
+        each = np.divide(force, self.area, out=np.zeros_like(force), where=self.area > 0)
+        # hats sum to one: one of two neighbours gains in the integrals what the other loses
+        gained = self.shared * np.diff(each)
+        return np.asarray(force + np.append(gained, 0.0) - np.append(0.0, gained))
+
+
 @dataclass(frozen=True, slots=True)
 class Pairing:
     """Contact kinematics at given positions, one row per slave vertex.
@@ -92,6 +110,11 @@ class Pairing:
     tangent: tuple[Array, Array]
     closing: tuple[Array, Array]
     points: Points
+
+    @property
+    def cover(self) -> Cover:
+        """Where the slave faces the master."""
+        return Cover(self.area, self.shared)
 
     @property
     def shrunk(self) -> Array:

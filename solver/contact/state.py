@@ -27,7 +27,7 @@ class ContactState:
         over change of the gap in the latter; NaN unless contact grew in both
     finite : whether the surfaces are paired in their current positions, or always as before loading
     slipped : (3, n) accumulated since the first increment, while in contact: length of slip [mm],
-        normal force and friction over it [N mm]
+        normal force and friction over it, spread under the hats [N mm]
     """
 
     normal: Array

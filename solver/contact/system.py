@@ -423,30 +423,23 @@ class System:
         return found
 
     def pressure(self, state: State, pair: int) -> tuple[Array, Array]:
-        """Return pressure and shear on the slave's vertices (n,) [MPa]: see `under_hats`."""
-        contact, pairing = state.contacts[pair], self.pairing(state, pair)
-        normal, tangential = (
-            self.under_hats(force, pairing, pair) for force in (contact.normal, contact.tangential)
-        )
-        return normal, tangential
+        """Return pressure and shear on the slave's vertices (n,) [MPa]: means under each hat.
 
-    def under_hats(self, force: Array, pairing: Pairing, pair: int) -> Array:
-        """Return forces (n,) on the slave's vertices over the area: means under each hat (n,).
-
-        The multiplier field is piecewise linear where the slave faces the master, and zero
-        elsewhere. Its means under the hats have the same resultant as its values at the vertices,
-        but do not oscillate next to a sharp corner, and do not grow where the master ends under a
-        hat (force over a small covered area). The sum of mean times area of the whole hat is the
-        contact force.
+        Means have the same resultant as the values of the multiplier field at the vertices (see
+        `Cover.spread`), but do not oscillate next to a sharp corner, and do not grow where the
+        master ends under a hat (force over a small covered area). The sum of mean times area of the
+        whole hat is the contact force.
 
         The area is that before loading, as the small strains of the slave imply.
         """
-        area, hats = pairing.area, self.interfaces[pair].slave_surface.hats
-        each = np.divide(force, area, out=np.zeros_like(force), where=area > 0)
-        # hats sum to one: one of two neighbours gains in the integrals what the other loses
-        gained = pairing.shared * np.diff(each)
-        integral = force + np.append(gained, 0.0) - np.append(0.0, gained)
-        return np.divide(integral, hats, out=np.zeros_like(force), where=hats > 0)
+        contact, hats = state.contacts[pair], self.interfaces[pair].slave_surface.hats
+        cover = self.pairing(state, pair).cover
+
+        def mean(force: Array) -> Array:
+            out = np.zeros_like(force)
+            return np.divide(cover.spread(force), hats, out=out, where=hats > 0)
+
+        return mean(contact.normal), mean(contact.tangential)
 
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return a sampler of nodal fields of a body at positions (2, n) [mm]."""

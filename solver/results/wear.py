@@ -29,7 +29,8 @@ FRETTING = declare(
     "MPa^2 mm",
 )  # fmt: skip
 _SLIPS = 1e-6
-"""Way over the longest one, above which a point slides."""
+"""Way over the longest one, or over the largest change of displacement, above which a point slides:
+where all stick, ways are rounding errors."""
 
 
 @output("wear", "contact")
@@ -38,6 +39,7 @@ class Wear(Checked):
     """Wear of the slave by Archard's law, length of slip, and fretting between two stages.
 
     All are sums over the increments. A point is in contact if it is so at the end of a stage.
+    Without friction slip is not known: all are NaN. A rigid slave has no tension.
     """
 
     since: str = described(MISSING, "stage from whose end on it counts")
@@ -60,16 +62,21 @@ class Wear(Checked):
         if first >= last:
             raise ModelError("results.wear.until", self.until, f"must come after {self.since}")
         states = [points[name] for name in names[first : last + 1]]
+        if not any(interface.rough for interface in system.interfaces):
+            numbers = WEAR_DEPTH, SLIP_LENGTH, SLIP_WORK, SLIP_SHARE, FRETTING
+            return dict.fromkeys(numbers, np.nan)
         each = [_of_pair(run, k, states) for k in range(len(system.interfaces))]
-        way, pressed, work, area, closed, tension = map(np.concatenate, zip(*each, strict=True))
+        values = map(np.concatenate, zip(*each, strict=True))
+        way, pressed, work, area, closed, tension, moved = values
         touching = float(area[closed].sum())
-        slides = closed & (way > _SLIPS * way.max())
+        slides = closed & (way > _SLIPS * max(way.max(), moved.max()))
+        known = (tension * work)[np.isfinite(tension)]
         return {
             WEAR_DEPTH: float(self.coefficient * pressed.max()),
             SLIP_LENGTH: float(way.max()),
             SLIP_WORK: float(work.max()),
             SLIP_SHARE: float(area[slides].sum()) / touching if touching else np.nan,
-            FRETTING: float((tension * work).max()),
+            FRETTING: float(known.max()) if known.size else np.nan,
         }
 
 
@@ -77,20 +84,27 @@ def _of_pair(run: FinishedRun, pair: int, states: Sequence[Any]) -> tuple[Array,
     """Return of the vertices of a slave, each (n,), what lies between the states.
 
     It is the way [mm], pressure and friction over it [N/mm], area [mm2], whether they are in
-    contact, and the largest tension along the surface [MPa].
+    contact, the largest tension along the surface [MPa], NaN of a rigid body, and the change of
+    displacement [mm].
     """
     system: Any = run.system
     interface, contacts = system.interfaces[pair], [at.state.contacts[pair] for at in states]
-    chain, (body, _) = interface.slave_surface, interface.declared.slave
+    chain, (body, boundary) = interface.slave_surface, interface.declared.slave
+    number, whole = interface.slave, system.chain(body, boundary)  # the part may be condensed
     way, *forces = contacts[-1].slipped - contacts[0].slipped
-    pairing = system.pairing(states[-1].state, pair)
-    nodes, (x, y) = chain.nodes[chain.vertices], chain.normals[:, chain.vertices]
-    stresses = [run.samples.fields.at_nodes(at, body).stress[:, nodes] for at in states]
-    tension = [y**2 * xx + x**2 * yy - 2 * x * y * xy for xx, yy, _, xy, *_ in stresses]
+    nodes, (x, y) = whole.nodes[whole.vertices], whole.normals[:, whole.vertices]
+    first, *_, last = (interface.parts[0].motion(chain, at.state.u[number]) for at in states)
+    tension = np.full((1, len(way)), np.nan)
+    if body in system.names:
+        stresses = [run.samples.fields.at_nodes(at, body).stress[:, nodes] for at in states]
+        tension = np.stack([
+            y**2 * xx + x**2 * yy - 2 * x * y * xy for xx, yy, _, xy, *_ in stresses
+        ])  # fmt: skip
     return (
         way,
-        *(system.under_hats(force, pairing, pair) for force in forces),
+        *(np.divide(each, chain.hats, out=each, where=chain.hats > 0) for each in forces),
         chain.hats,
         np.any([contact.normal > 0 for contact in contacts], axis=0),
         np.max(tension, axis=0, initial=0.0),
+        np.hypot(*(last - first))[chain.vertices],
     )
