@@ -109,6 +109,9 @@ class Fatigue:
         if criterion is None:
             if held is None or limits:
                 raise ModelError("criterion", None, "must be given, or crack alone")
+            if more.get("bodies"):
+                allowed = "belong to a criterion: leave them out for a crack alone"
+                raise ModelError("bodies", more["bodies"], allowed)
             return cls(criterion=None, crack=held, **more)
         part, known = CRITERIA[criterion], CRITERIA.declared_by(criterion)
         for name in limits:

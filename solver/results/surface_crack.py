@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
+from solver.errors import ModelError
 from solver.fatigue.cracks import arrest, opened_range, stress_intensity
 from solver.results.fields import StressCycle
 from solver.results.quantities import declare
@@ -34,7 +35,8 @@ class SurfaceCrack:
     ----------
     threshold : range of K below which it does not grow [MPa mm^0.5]
     initial : its depth at the beginning [mm]
-    at : position along the surface; None for the middle one of the profiles [mm]
+    at : position along the surface, of a symmetric body on either half; None for the middle one of
+        the profiles [mm]
     across : whether stress across the plane (in space, across the track) opens it, not stress along
         the surface (along the track)
     """
@@ -45,10 +47,22 @@ class SurfaceCrack:
     across: bool = False
 
     def values(self, run: FinishedRun, cycle: StressCycle, void: Bools) -> Values:
-        """Return the quantities of a run; ``void`` are cycles (n,) for which K does not hold."""
+        """Return the quantities of a run; ``void`` are cycles (n,) for which K does not hold.
+
+        Raises
+        ------
+        ModelError
+            if it begins beyond the profiles or outside the body
+        """
         view, body = run.view, run.view.profile_body
+        if self.initial >= view.depth[-1]:
+            allowed = f"must be less than the depth of profiles, {view.depth[-1]:g} mm"
+            raise ModelError("fatigue.crack.initial", self.initial, allowed)
         at = view.station[len(view.station) // 2] if self.at is None else self.at
+        at = abs(at) if view.symmetric else at
         sampler = run.system.sampler(body, replace(view, station=np.array([at])).profiles)
+        if self.at is not None and not sampler.inside[0]:
+            raise ModelError("fatigue.crack.at", self.at, f"must be on the surface of {body}")
         cycle_of = np.arange(len(cycle.of)), cycle.of
         which = csr_array((np.ones(len(cycle.of)), cycle_of))
         across, up = (1.0, 0.0) if len(view.axis.along) == 3 else view.axis.along

@@ -90,9 +90,6 @@ def fatigue_of(table: tables.FatigueTable, view: View) -> Fatigue:
     made, depth = Fatigue.of(**table.model_dump()), view.depth
     if table.crack and (not depth.size or depth[0] != 0.0):
         raise ModelError("crack", "given", "needs results.profile with a depth from 0 on")
-    if table.crack and table.crack.initial >= depth[-1]:
-        allowed = f"must be less than the depth of profiles, {depth[-1]:g} mm"
-        raise ModelError("crack.initial", table.crack.initial, allowed)
     return made
 
 

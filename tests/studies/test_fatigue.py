@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver.errors import ModelError
 from solver.fatigue import DangVan, Findley, Paths, stress_intensity
 from solver.results.fatigue import Applies
 from studies import Study, StudyError, to_dataframe
@@ -233,6 +234,36 @@ def test_a_crack_in_constant_and_linear_stress_is_a_closed_form(side: str) -> No
     np.testing.assert_allclose(across, -100 * 1.1215 * unit, rtol=2e-4)
 
 
+@pytest.mark.solves
+def test_a_crack_beyond_the_body_or_its_profiles_is_refused_by_its_run() -> None:
+    """Bodies and profiles of runs differ: the profile of this one goes down to 6 mm."""
+    assert held_block("top", initial=5.9).coordinates["depth"][-1] == 6.0
+    with pytest.raises(ModelError, match=r"crack\.initial = 6\.0: .* depth of profiles, 6 mm"):
+        held_block("top", initial=6.0)
+    with pytest.raises(ModelError, match=r"crack\.at = 4\.5: must be on the surface of block"):
+        held_block("top", at=4.5)
+
+
+@pytest.mark.solves
+def test_a_crack_in_a_deeper_profile_than_that_of_the_default_parameters() -> None:
+    crack = {"crack": {"threshold": 100.0, "initial": 55.0}}
+    assert record_of(rolled(None)).coordinates["depth"][-1] < 55.0
+    deep = record_of(rolled(crack, radius=2000.0, load_ratio=1.0))
+    assert deep.coordinates["depth"][-1] > 55.0 and "crack_K_range" in deep.fields
+
+
+@pytest.mark.solves
+def test_a_crack_may_lie_in_the_half_that_is_not_computed() -> None:
+    content = {"name": "half", "scene": "punch", "parameters": {"accuracy": "draft"}}
+    left, right = (
+        record_of(Study.from_dict(content | {"fatigue": {"crack": CRACK | {"at": at}}}))
+        for at in (-30.0, 30.0)
+    )
+    K = left.fields["crack_K_smallest"][1]
+    assert np.isfinite(K).all() and K.min() < 0
+    np.testing.assert_array_equal(K, right.fields["crack_K_smallest"][1])
+
+
 def below_hertz(x: np.ndarray, z: np.ndarray, a: float, f: float) -> np.ndarray:
     """Return xx over p0 at depths z under a Hertz pressure with sliding friction f.
 
@@ -292,6 +323,7 @@ def test_studies_without_the_table_are_as_before() -> None:
         ("fatigue.cyclic", DANG_VAN | {"cyclic": True}),
         ("fatigue.criterion", {"bodies": []}),
         ("fatigue.criterion", {"crack": CRACK, "limits": {"torsion": 300.0}}),
+        ("fatigue.bodies", {"crack": CRACK, "bodies": ["half_space"]}),
         ("fatigue.crack.threshold", {"crack": {"initial": 0.1}}),
         ("fatigue.crack.threshold", {"crack": {"initial": 0.1, "threshold": "3 MPa"}}),
         ("fatigue.crack.initial", {"crack": {"initial": 0.0, "threshold": 3.0}}),
