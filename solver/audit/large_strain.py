@@ -18,8 +18,9 @@ where f are nodal forces, of which v removes those that neither loads, links nor
 Loads that follow the boundary, such as a pressure, are those on the deformed one. Links and contact
 respond to v as in an increment: contact may close, open and slip.
 
-D is the elastic stiffness, and where plastic strain grew in the last increment the tangent of one
-increment that ends there and has half of the plastic strain p since the state before. A change x of
+D is the elastic stiffness, and where plastic strain grew since the state before the tangent of one
+increment that ends there and has half of this plastic strain p, in the direction of the last
+increment, or where this is elastic in that of p. A change x of
 p along its direction meets the hardening only. Across it, stress stays parallel to the flow if it
 changes by ``|dev T| dx/d|p|``. What small strain neglects grows with the square of the deformation,
 so x as the square of p: dx/d|p| = 2 x / |p|. Flow has the stiffness ``2 |dev T| / |p|`` across p,
@@ -57,6 +58,7 @@ from solver.fem.rigid import RigidPart, turning
 from solver.fem.substructure import Substructure
 from solver.linear.schur import Eliminated
 from solver.loading.step import newton_step
+from solver.materials import PlasticState
 from solver.materials.elasticity import Elasticity
 from solver.tensors import SQRT2, to_tensor
 from solver.typing import Array
@@ -154,8 +156,8 @@ class _Deformed:
     since : its change since the state ``before``
     volume : (n_points,) volume of the points [mm3], zero near singular points and where removed
     most : elastic energy of T, the largest so far [N mm]
-    accumulated : (n_points,) accumulated plastic strain
-    tangent : response of points that flow, with their tangent; None if none does
+    plastic : internal variables
+    tangent : response with the tangent D; None where the body has its elastic stiffness
     """
 
     def __init__(
@@ -169,7 +171,7 @@ class _Deformed:
         else:
             found = system.state(self.name, converged)
             self.stress, plastic = found.stress, found.plastic
-        self.accumulated = plastic.accumulated
+        self.plastic = plastic
         counts = plain.remaining(state.time) > GHOST
         for point in system.model.singular:
             counts &= ~point.reaches(plain.points)
@@ -197,27 +199,32 @@ class _Deformed:
         change = _mandel(_logarithm(H), np.log(np.maximum(1 + hoop, _FLAT))) - e
         self.strain = np.where(counts, plain.level(change).reshape(4, -1), 0.0)
         self.since = self.strain if before is None else self.strain - before.strain
-        if not plain.body.material.elastic:
-            earlier = 0.0 if before is None else before.accumulated
-            self._flow(converged, self.accumulated - earlier)
+        if isinstance(system.parts[self.number], Discretisation):
+            self._flow(converged, self.part.virgin() if before is None else before.plastic)
 
-    def _flow(self, converged: Converged, grown: Array) -> None:
+    def _flow(self, converged: Converged, before: PlasticState) -> None:
         """Set the tangent of points that flow, with one increment over half of their flow.
 
-        ``grown`` (n_points,) is the plastic strain accumulated since the state before.
+        Its direction is that of the last increment, or where this is elastic that of the plastic
+        strain since the state ``before``.
         """
         state, u = converged.state, converged.state.u[self.number]
         now, last = (each.plastic[self.number] for each in (state, converged.start))
-        least = now.accumulated - last.accumulated
-        flows = least > 0
-        if not flows.any():
+        grown, least = (now.accumulated - each.accumulated for each in (before, last))
+        stiff = np.asarray(self.part.law(state.time).stiff)
+        if not ((grown > 0).any() or (least > 0).any() or (stiff != 1).any()):
             return
-        back = np.divide(np.maximum(grown / 2, least), least, out=np.zeros_like(least), where=flows)
-        half = now.unpacked(now.packed - back * (now.packed - last.packed))
-        found = self.part.respond(u, half, state.time)
-        C = self._stiffness[:, :, None]
+        back = np.divide(np.maximum(grown / 2, least), least, out=np.zeros_like(least),
+                         where=least > 0)  # fmt: skip
+        half = now.packed - back * (now.packed - last.packed)
+        stopped = (grown > 0) & (least <= 0)
+        half[:, stopped] = (now.packed + before.packed)[:, stopped] / 2
+        found = self.part.respond(u, now.unpacked(half), state.time)
+        flows = ((grown > 0) | (least > 0)) & np.isfinite(found.law.tangent).all(axis=(0, 1))
+        C = self._stiffness[:, :, None] * stiff
         D = np.where(flows, found.law.tangent + _STIFF * (C - found.law.tangent), C)
-        self.tangent = found._replace(law=found.law._replace(tangent=D, yielding=flows))
+        changed = np.broadcast_to(flows | (stiff != 1), flows.shape)
+        self.tangent = found._replace(law=found.law._replace(tangent=D, yielding=changed))
 
     def stressed(self, strain: Array) -> Array:
         """Return the stress (4, n_points) of a small change of strain [MPa]."""

@@ -99,7 +99,7 @@ def audit(
     )
     pairs = [AuditedPair(system, k, loaded) for k in range(len(system.interfaces))]
     broken, beyond = _laws(bodies, released)
-    every = list({id(each): each for each in (*states, *stages)}.values())
+    every = list({id(each): each for each in (*stages, *states)}.values())
     names = ("audit_overlap", "audit_closed_gap", "audit_tension", "audit_friction_excess",
              "audit_slip", "audit_contact_resolution")  # fmt: skip
     figures = {
