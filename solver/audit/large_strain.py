@@ -42,6 +42,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -57,6 +58,7 @@ from solver.fem.large import following
 from solver.fem.rigid import RigidPart, turning
 from solver.fem.substructure import Substructure
 from solver.linear.schur import Eliminated
+from solver.linear.solvers import Singular
 from solver.loading.step import newton_step
 from solver.materials import PlasticState
 from solver.materials.elasticity import Elasticity
@@ -106,6 +108,12 @@ def _largest(each: Iterable[Neglected]) -> Neglected:
 
 
 def _neglected(share: float, body: str) -> Neglected:
+    if math.isnan(share):
+        return Neglected(
+            share,
+            f"what small-strain theory neglects in the stress of {body} cannot be estimated: "
+            "nothing balances the forces that large strain would add, reduce the load",
+        )
     return Neglected(
         share,
         f"equilibrium in the deformed configuration and logarithmic strain would change the stress "
@@ -219,7 +227,8 @@ class _Deformed:
         half = now.packed - back * (now.packed - last.packed)
         stopped = (grown > 0) & (least <= 0)
         half[:, stopped] = (now.packed + before.packed)[:, stopped] / 2
-        found = self.part.respond(u, now.unpacked(half), state.time)
+        with np.errstate(all="ignore"):  # a law may have no response to a state on this line
+            found = self.part.respond(u, now.unpacked(half), state.time)
         flows = ((grown > 0) | (least > 0)) & np.isfinite(found.law.tangent).all(axis=(0, 1))
         C = self._stiffness[:, :, None] * stiff
         D = np.where(flows, found.law.tangent + _STIFF * (C - found.law.tangent), C)
@@ -257,21 +266,21 @@ def _add(system: System, converged: Converged, bodies: Sequence[_Deformed], moti
         condensed = part.begin(force) if isinstance(part, Substructure) else None
         begun.append(condensed or Eliminated(force, lambda u: u))
         own[body.number] = begun[-1].condensed
-    flows = {body.number: body.tangent for body in bodies}
-    operators = [
-        inverse.tangent(flow, 0.0) if (flow := flows.get(k)) else inverse.elastic
-        for k, inverse in enumerate(system.operators)
-    ]
     path = state.contacts, state.links, state.time - start.time
     kept = no_candidates(system, state.u, state.links)
     touching = kept if converged.separated else find_candidates(system, start, state.u, *path)
-    step = None
-    for each in (touching, kept):  # contact forces are kept where no others balance the change
-        change = each.motion.copy()
-        change[each.linked] -= motion
-        here = replace(each, motion=change, turning=None)
-        forces = tuple(force - here.all_on_part(k, here.forces) for k, force in enumerate(own))
-        step = step or newton_step(system, forces, operators, here, state.time)
+    flows, step = {body.number: body.tangent for body in bodies}, None
+    with suppress(Singular):
+        operators = [
+            inverse.tangent(flow, 0.0) if (flow := flows.get(k)) else inverse.elastic
+            for k, inverse in enumerate(system.operators)
+        ]
+        for each in (touching, kept):  # contact forces are kept where no others balance the change
+            change = each.motion.copy()
+            change[each.linked] -= motion
+            here = replace(each, motion=change, turning=None)
+            forces = tuple(force - here.all_on_part(k, here.forces) for k, force in enumerate(own))
+            step = step or newton_step(system, forces, operators, here, state.time)
     for body, back in zip(bodies, begun, strict=True):
         u = back.finish(step.u[body.number]) if step else np.full(body.part.n, np.nan)
         body.added = body.added + body.stressed(body.part.strain(u))

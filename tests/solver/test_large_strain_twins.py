@@ -27,6 +27,7 @@ from solver import (
     solve,
 )
 from solver.audit.plain import PlainBody
+from solver.linear.solvers import Singular
 from solver.mesh import grid
 from solver.model.loads import Load, Removal
 from solver.model.rigid import line
@@ -138,6 +139,21 @@ def test_a_bar_whose_flow_has_stopped_at_the_end_of_a_stage_is_no_false_alarm(
         (*first, Stage(name="loaded", target=2.0, steps=4 if first else 20)),
     )  # fmt: skip
     assert found == pytest.approx(true, rel=0.15)
+
+
+@pytest.mark.parametrize("fails", [True, False])
+def test_an_estimate_without_balance_puts_the_run_outside_theory(
+    monkeypatch: pytest.MonkeyPatch, fails: bool
+) -> None:
+    def nothing(*args: Any) -> None:
+        if fails:
+            raise Singular("no stiffness")
+
+    run = solve(clamped(steel(200.0), 8.0, 0.03)("small"), stages=LOADED)
+    monkeypatch.setattr("solver.audit.large_strain.newton_step", nothing)
+    audit = run.audit()
+    assert math.isnan(audit.figures["audit_large_strain"])
+    assert any("the stress of block cannot be estimated" in text for text in audit.outside)
 
 
 def test_removed_elements_resist_nothing() -> None:
