@@ -50,8 +50,8 @@ def sampled(study: Any, most: int) -> Any:
     swept = [name for name in cases[0] if any(case[name] != cases[0][name] for case in cases)]
     chosen = sorted(random.Random(0).sample(range(len(cases)), most))
     content = study.to_dict()
-    del content["sweep"]
-    content["points"] = [{name: cases[k][name] for name in swept} for k in chosen]
+    points = [{name: cases[k][name] for name in swept} for k in chosen]
+    content["sweep"] = {"choice": points}  # a scene may have a dimension ``point``
     return type(study).from_dict(content, scenes=lambda name: study.problem)
 
 

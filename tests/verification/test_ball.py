@@ -20,14 +20,14 @@ LOADED = {"unload_steps": 1}
 FINE = {"element_size": 1 / 16, "load_step": 0.1}
 
 
-def pressed(**own: Any) -> Record:
-    return record_of(BALL.parameters(**({"accuracy": "draft", "load_step": 0.2} | own)))
+def pressed(status: Status = Status.OK, **own: Any) -> Record:
+    return record_of(BALL.parameters(**({"accuracy": "draft", "load_step": 0.2} | own)), status)
 
 
 @cache
-def record_of(parameters: Any) -> Record:
+def record_of(parameters: Any, status: Status) -> Record:
     (record,) = BALL.path(parameters, [parameters.cycles], lambda fraction: None)
-    assert record.status is Status.OK, record.message
+    assert record.status is status, record.message
     return kept(record)
 
 
@@ -57,7 +57,7 @@ def test_the_half_space_first_yields_at_the_pressure_of_the_closed_form() -> Non
 
 def test_a_contact_that_yields_all_over_has_the_mean_pressure_of_an_indentation() -> None:
     own: dict[str, Any] = {"load_ratio": 14.0, "ball_stiffness": 20.0} | FINE | LOADED
-    found = pressed(**own).scalars
+    found = pressed(Status.OUTSIDE_THEORY, **own).scalars
     assert 2.8 * RE < found["mean_contact_pressure"] < 3.1 * RE
 
 
