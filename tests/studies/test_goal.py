@@ -507,6 +507,19 @@ def test_a_run_of_which_a_path_told_nothing_is_asked_for_again(store: Store, sce
     assert again.path == lost
 
 
+def test_a_stored_run_above_the_first_one_beyond_is_none_of_the_search(tmp_path: Path) -> None:
+    """The answer and its number of runs do not depend on what other studies have stored."""
+    asked = study(PRESSURE | {"between": [0.2, 3.2]}, {}, half_width=20.0)
+    alone, other = Store(tmp_path / "a"), Store(tmp_path / "b")
+    path = next(filter(None, Asking(asked, other).paths())).path
+    last = (replace(path, cases=path.cases[-1:]),)
+    task = PathTask(asked.problem, last, other.directory, solver_hash())
+    walk(task, lambda row: None, lambda: False)
+    assert len(search_here(asked, alone)) == len(search_here(asked, other))
+    with open_study(tmp_path / "a") as one, open_study(tmp_path / "b") as two:
+        assert results_of(one).equals(results_of(two))
+
+
 def test_a_stored_run_beyond_ends_its_path(store: Store) -> None:
     """So does the first stored run tell whether the number of ``at`` rises."""
     asked = study(PRESSURE | {"between": [0.2, 3.2]}, {}, half_width=20.0)

@@ -531,7 +531,7 @@ class Search(Chooser):
 
     def _round_ends(self) -> bool:
         """Move the ends of the bracket; return whether the round is complete."""
-        for value in self._round:
+        for k, value in enumerate(self._round):
             if value not in self.rows:
                 return False
             look = self.look(value)
@@ -543,6 +543,8 @@ class Search(Chooser):
                 return True
             if look.beyond:
                 self.high = value
+                for above in self._round[k + 1 :]:  # not needed, but another study has stored it
+                    self.rows.pop(above, None)
                 break
             self.low = value
         if self.goal.halves and (values := self._halved()):
