@@ -72,6 +72,9 @@ _FAINT = 1e-5
 _STIFF = 1e-5
 """Least stiffness of points that flow, over the elastic one: without hardening a body may be a
 mechanism, which rounding moves. A tenth of it, or ten times as much, change estimates by 2 %."""
+_LITTLE = 1e-3
+"""Plastic strain since the state before, over the elastic strain, up to which a point is elastic:
+one that is loaded again to where it flowed does so by rounding."""
 _FLAT = 1e-6
 """Least stretch; inverted elements count as flat."""
 
@@ -219,6 +222,8 @@ class _Deformed:
         state, u = converged.state, converged.state.u[self.number]
         now, last = (each.plastic[self.number] for each in (state, converged.start))
         grown, least = (now.accumulated - each.accumulated for each in (before, last))
+        elastic = np.linalg.norm(self.stress, axis=0) / self.elasticity.youngs_modulus
+        grown, least = (np.where(grown > _LITTLE * elastic, each, 0.0) for each in (grown, least))
         stiff = np.asarray(self.part.law(state.time).stiff)
         if not ((grown > 0).any() or (least > 0).any() or (stiff != 1).any()):
             return

@@ -21,6 +21,7 @@ from solver import (
     SingularPoint,
     Stage,
     Status,
+    Traction,
     solve,
 )
 from solver.audit.theory import LARGE, largest_strain
@@ -98,6 +99,17 @@ def test_cycles_of_small_strain_are_within_theory_however_long() -> None:
     assert audit.figures["audit_plastic_strain"] > 0.1
     assert audit.outside == ()
     assert audit.figures["audit_large_strain"] == pytest.approx(lacks(0.008), rel=1e-3)
+
+
+def test_a_bar_that_is_loaded_again_to_where_it_flowed_lacks_what_it_did() -> None:
+    """It flows again by rounding alone."""
+    eased = Amplitude(time=np.arange(4.0), value=np.array([0.0, 1.0, 0.0, 1.0]))
+    T = SOFT.yield_stress + 0.01 * SOFT.youngs_modulus * 0.049
+    pull = Traction(boundary="right", x=T, amplitude=eased)
+    bar = replace(stretched(0.0, SOFT), loads=(pull,))
+    stages = tuple(Stage(name=f"s{k}", target=float(k), steps=4) for k in range(1, 4))
+    audit = solve(Model(bodies=(bar,)), stages=stages).audit("s3")
+    assert audit.figures["audit_large_strain"] == pytest.approx(0.05, rel=0.05)
 
 
 def test_large_strain_at_a_singular_point_does_not_count() -> None:
