@@ -38,8 +38,8 @@ from studies.execution.forks import Forks
 from studies.storage.room import FULL
 
 READERS = Forks(("service.sandbox", "service.examined"))
-"""The processes; what a call needs besides is loaded for it and all that follow. With xarray they
-would take five times as long to load, and no study needs it to be computed, or its table."""
+"""The processes; what a call needs besides is loaded for it and all that follow. Xarray, which
+checks and tables do not need, would take five times as long to load."""
 
 _LIBC = ctypes.CDLL(None, use_errno=True)
 _NO_NEW_PRIVILEGES = 38

@@ -20,11 +20,11 @@ respond to v as in an increment: contact may close, open and slip.
 
 D is the elastic stiffness, and where plastic strain grew since the state before the tangent of one
 increment that ends there and has half of this plastic strain p, in the direction of the last
-increment, or where this is elastic in that of p. A change x of
-p along its direction meets the hardening only. Across it, stress stays parallel to the flow if it
-changes by ``|dev T| dx/d|p|``. What small strain neglects grows with the square of the deformation,
-so x as the square of p: dx/d|p| = 2 x / |p|. Flow has the stiffness ``2 |dev T| / |p|`` across p,
-in series with the elastic one: that of such an increment by the backward Euler method.
+increment, or where this is elastic in that of p. A change x of p along its direction meets the
+hardening only. Across it, stress stays parallel to the flow if it changes by ``|dev T| dx/d|p|``.
+What small strain neglects grows with the square of the deformation, so x as the square of p:
+dx/d|p| = 2 x / |p|. Flow has the stiffness ``2 |dev T| / |p|`` across p, in series with the elastic
+one: that of such an increment by the backward Euler method.
 
 Links that rotate a body by w stretch it by ln(1 + w^2) / 2, because its displacements are linear. v
 removes this stretch: it includes -ln(1 + w^2) / 2 times the position relative to the centre of
@@ -225,7 +225,7 @@ class _Deformed:
         elastic = np.linalg.norm(self.stress, axis=0) / self.elasticity.youngs_modulus
         grown, least = (np.where(grown > _LITTLE * elastic, each, 0.0) for each in (grown, least))
         stiff = np.asarray(self.part.law(state.time).stiff)
-        if not ((grown > 0).any() or (least > 0).any() or (stiff != 1).any()):
+        if not (grown.any() or (stiff != 1).any()):
             return
         back = np.divide(np.maximum(grown / 2, least), least, out=np.zeros_like(least),
                          where=least > 0)  # fmt: skip
@@ -234,7 +234,7 @@ class _Deformed:
         half[:, stopped] = (now.packed + before.packed)[:, stopped] / 2
         with np.errstate(all="ignore"):  # a law may have no response to a state on this line
             found = self.part.respond(u, now.unpacked(half), state.time)
-        flows = ((grown > 0) | (least > 0)) & np.isfinite(found.law.tangent).all(axis=(0, 1))
+        flows = (grown > 0) & np.isfinite(found.law.tangent).all(axis=(0, 1))
         C = self._stiffness[:, :, None] * stiff
         D = np.where(flows, found.law.tangent + _STIFF * (C - found.law.tangent), C)
         changed = np.broadcast_to(flows | (stiff != 1), flows.shape)

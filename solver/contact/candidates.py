@@ -219,15 +219,17 @@ class Candidates(OnParts):
         ``grows`` is false if a load moves along a body: the contact then moves instead of growing.
         """
         after = self.states(before, self.forces, self.status)
-        moved = np.abs(self.motion[self.along]) if self.frictional else np.zeros(self.n)
-        moved, out = np.where(self.status == OPEN, 0.0, moved), []
+        way = np.abs(self.motion[self.along]) if self.frictional else 0.0
+        moved, out = np.where(self.status == OPEN, 0.0, way), []
         each = zip(
             before, after, self.vertices, self.places, self.covers, self.gaps, self.slips,
             strict=True,
         )  # fmt: skip
         for old, new, at, here, cover, gap, slip in each:
-            slipped = old.slipped.copy()
-            slipped[:, at] += moved[here] * _over_way(old, new, cover)[:, at]
+            slipped = old.slipped
+            if self.frictional:
+                slipped = slipped.copy()
+                slipped[:, at] += moved[here] * _over_way(old, new, cover)[:, at]
             with np.errstate(invalid="ignore", divide="ignore"):
                 rates = np.stack([gap - old.gap, slip]) / span
                 earlier = np.stack([old.gap, old.earlier[0], old.rates[1] / old.rates[0]])

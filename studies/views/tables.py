@@ -181,8 +181,8 @@ def _own(dataset: xr.Dataset) -> list[str]:
     parameters = [*_parameters(dataset), *map(str, dataset.coords)]
     known = {named(*each) for each in derived(every, parameters)}
     known |= {*LABEL_ATTRIBUTES, *map(reach, parameters)}
-    own = [name for name in names if name not in known and not name.startswith(_AUDIT)]
-    own = [name for name in own if name not in QUANTITIES]
+    own = [name for name in names if name not in known and not name.startswith(_AUDIT)
+           and name not in QUANTITIES]  # fmt: skip
     ends = {f"_{axis}" for axis in AXES}
     return [name for name in own if name[-2:] not in ends or name[:-2] not in own]
 

@@ -9,10 +9,11 @@ import xarray as xr
 
 from studies.errors import StudyError
 from studies.kinds.kind import Found
+from studies.kinds.ranged import FOUND, MOST
 from studies.views.best import best_runs
 from studies.views.columns import unit_of, value_text
 
-_ENDS = {"found": "the search settled", "most": "its runs were used up", "open": "it was stopped"}
+_ENDS = {FOUND: "the search settled", MOST: "its runs were used up", "open": "it was stopped"}
 """What the words of ``search_state`` say."""
 
 
