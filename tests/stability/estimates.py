@@ -25,10 +25,11 @@ SEED = 1954
 
 
 class Timed(NamedTuple):
-    """Processor time of a scene: as estimated, low and high, and as it was [s]."""
+    """Processor time of a scene: as estimated, low, likely and high, and as it was [s]."""
 
     what: str
     low: float
+    likely: float
     high: float
     took: float
 
@@ -55,7 +56,7 @@ def timed(what: str, tables: Mapping[str, Any], folder: Path) -> Timed:
     assert told is not None
     began = time.process_time()
     compute_here(study, store)
-    return Timed(what, told[0], told[-1], time.process_time() - began)
+    return Timed(what, *told, time.process_time() - began)
 
 
 def _finer(tables: Any, factor: float) -> Any:

@@ -108,19 +108,16 @@ def test_the_pace_is_that_of_past_runs(store: Store, outliers: int) -> None:
 @pytest.mark.solves
 @pytest.mark.divides
 def test_own_scenes_take_as_long_as_estimated(tmp_path: Path) -> None:
-    """18 of 20; `make stress` has more of them, with finer meshes too."""
-    found = [timed(*each, tmp_path / str(k)) for k, each in enumerate(drawn(20))]
-    outside = [each for each in found if not each.inside]
-    assert len(outside) <= 2, outside
+    """18 of 20, and a bar of large strain, whose increments cost more and are divided.
 
-
-@pytest.mark.solves
-@pytest.mark.divides
-def test_a_scene_of_large_strain_takes_as_long_as_estimated(tmp_path: Path) -> None:
-    """Its increments cost more, and are divided while the bar yields."""
-    tables = tomllib.loads((ROOT / "data/scenes/neck.toml").read_text())
-    found = timed("neck", tables, tmp_path)
-    assert found.inside, found
+    A slow machine, or one with other work, is slow for all: `make stress` has the seconds.
+    """
+    neck = tomllib.loads((ROOT / "data/scenes/neck.toml").read_text())
+    scenes = [("neck", neck), *drawn(20)]
+    found = [timed(*each, tmp_path / str(k)) for k, each in enumerate(scenes)]
+    pace = max(1.0, float(np.median([each.took / each.likely for each in found])))
+    inside = [each.low <= each.took / pace <= each.high for each in found]
+    assert inside[0] and sum(inside) >= 19, (pace, found)
 
 
 def test_a_goal_is_estimated_by_the_search_that_is_expected(store: Store) -> None:
