@@ -1,6 +1,7 @@
 PYTHON ?= $(firstword $(shell command -v python3.11 python3))
 BIN := .venv/bin
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+SUITE = $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 STAMP := .venv/installed
 COMPILED := .venv/compiled
 KERNELS := solver/rolling/kernels.py solver/fatigue/kernels.py
@@ -26,10 +27,10 @@ run: setup ## compute a first study in seconds, then the 45 runs of the punch, i
 
 check: setup ## check style and types, and run the tests that compute nothing (90 s)
 	@$(MAKE) lint
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m "not solves and not processes and not pages"
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m "not solves and not processes and not pages and not long"
 
-test: setup ## run the whole test suite on all cores
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --durations=15
+test: setup ## run all tests but the long ones on all cores
+	$(SUITE) --durations=15 -m "not long"
 
 serve: setup ## start the HTTP service
 	$(BIN)/residua serve
@@ -53,7 +54,8 @@ measured: setup ## compute, compare and draw what stands in docs/measured.md (5 
 bench: setup ## draw CPU time against error
 	$(BIN)/python -m tests.benchmarks
 
-stress: setup ## run 2229 seeded scenes, and see that none is answered wrongly (hours)
+stress: setup ## run the long tests and 2229 seeded scenes, and see that none is answered wrongly (hours)
+	$(SUITE) -m long
 	$(BIN)/python -m tests.stability.estimates 39
 	$(BIN)/python -m tests.stability
 	RESIDUA_PARTS=$(OWN) $(BIN)/python -m tests.stability.slopes

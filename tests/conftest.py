@@ -35,7 +35,7 @@ _SOLVED = ("tests.verification", "tests.solver", "tests.stability.kinds", "tests
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """Return the number of test processes: one a core, and one more where tests that wait run."""
-    return len(os.sched_getaffinity(0)) + (not config.getoption("markexpr"))
+    return len(os.sched_getaffinity(0)) + ("not processes" not in config.getoption("markexpr"))
 
 
 @pytest.hookimpl(optionalhook=True)

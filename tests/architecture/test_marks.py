@@ -81,9 +81,16 @@ def test_a_page_may_do_both() -> None:
 
 def test_the_quick_check_leaves_out_every_mark() -> None:
     marks = {each.partition(":")[0] for each in PROJECT["tool"]["pytest"]["ini_options"]["markers"]}
-    assert marks == {*EXPENSIVE, "pages", "divides"}
+    assert marks == {*EXPENSIVE, "pages", "divides", "long"}
     (left_out,) = re.findall(r'pytest .*-m "(.*)"', (ROOT / "Makefile").read_text())
     assert set(left_out.split(" and ")) == {f"not {mark}" for mark in marks - {"divides"}}
+
+
+def test_long_tests_are_run_by_the_stress_run_alone() -> None:
+    chosen = re.findall(
+        r"^(\w+):.*\n\t\$\(SUITE\).* -m (.*)", (ROOT / "Makefile").read_text(), re.M
+    )
+    assert dict(chosen) == {"test": '"not long"', "stress": "long"}
 
 
 @pytest.mark.solves

@@ -2,7 +2,7 @@
 
 Both have increments of one element: points of the endless track are one element apart. A Hertz
 pressure passes without friction. What is left is the ends, and half-planes of 400 half-widths in
-the place of 1 600.
+the place of 1 600. `test_rolling_endless.py` runs the same code.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from solver.rolling.scenes.rolling import RollingParameters
 from solver.rolling.scenes.rolling_endless import load_on
 from solver.rolling.scenes.rolling_model import model
 from tests.verification.interleaved import InterleavedTrack
+
+pytestmark = pytest.mark.long
 
 SIDE = 4.0
 FREE = {
