@@ -19,8 +19,8 @@ STEP = -1e-6
 above a whole number of increments would need one more."""
 
 _WIDER = 10.0
-"""The same of a parameter that moves nodes, over `STEP`: positions are known up to rounding, and
-gaps of a contact are small differences of them."""
+"""The same where more is known up to rounding only, over `STEP`: of a parameter that moves nodes,
+since gaps of a contact are small differences of their positions, and of passes over a prism."""
 
 _SHARE = 0.3
 """Time of a neighbouring run over that of the run: .15 on a punch of standard and .3 of draft
@@ -117,10 +117,10 @@ class Derivatives:
         notes += at_switches({by: there[reach(by)] for by in self.by if reach(by) in there})
         return notes + doubted({q.name: value for q, value in values.items()})
 
-    def steps(self, parameters: Any, moving: Collection[str]) -> dict[str, float]:
+    def steps(self, parameters: Any, wider: Collection[str]) -> dict[str, float]:
         """Return the difference of each parameter that is not zero.
 
-        ``moving`` parameters move the nodes of a mesh.
+        It is ten times wider for some of them, see `_WIDER`.
         """
         found = {}
         for name in self.by:
@@ -129,7 +129,7 @@ class Derivatives:
                 raise ModelError(name, value, "must be a number: it is derived by")
             if value == 0:
                 continue
-            found[name] = value * STEP * (_WIDER if name in moving else 1.0)
+            found[name] = value * STEP * (_WIDER if name in wider else 1.0)
             try:
                 replace(parameters, **{name: value + found[name]})
             except ModelError:  # at the lower end of its range

@@ -37,6 +37,7 @@ class Family:
     asked : the derivatives
     scene : the scene
     run : parameters of the last run of the path
+    wider : parameters whose differences are wider
 
     Raises
     ------
@@ -44,8 +45,8 @@ class Family:
         naming a parameter by which no derivative exists
     """
 
-    def __init__(self, asked: Derivatives, scene: Any, run: Any) -> None:
-        self._asked, self._scene, self._moving = asked, scene, set[str]()
+    def __init__(self, asked: Derivatives, scene: Any, run: Any, wider: Iterable[str] = ()) -> None:
+        self._asked, self._scene, self._wider = asked, scene, set(wider)
         self._ways = dict[str, int]()
         self._declared = asked.quantities(type(run), scene.known_quantities)
 
@@ -56,7 +57,7 @@ class Family:
 
     def steps(self, run: Any) -> dict[str, float]:
         """Return the difference of each parameter by which a run is derived."""
-        steps = self._asked.steps(run, self._moving).items()
+        steps = self._asked.steps(run, self._wider).items()
         return {name: step * way for name, step in steps if (way := self._ways.get(name, 1))}
 
     def keep_mesh(self, run: Any, same: Callable[[Any], bool]) -> None:
@@ -73,14 +74,18 @@ class Family:
         """
         self._ways = {}
         for name, step in self.steps(run).items():
-            value, sides = getattr(run, name), dict[int, bool]()
+            value, known = getattr(run, name), 0
             for way in (1, -1):
                 with suppress(ModelError):  # the end of its range
-                    sides[way] = same(replace(run, **{name: value + way * step}))
-            if not any(sides.values()) and len(sides) > 1:
-                allowed = "must not change the mesh: derivatives are taken by it"
-                raise ModelError(name, value, allowed)
-            self._ways[name] = next((way for way, kept in sides.items() if kept), 0)
+                    if same(replace(run, **{name: value + way * step})):
+                        self._ways[name] = way
+                        break
+                    known += 1
+            else:
+                if known > 1:
+                    allowed = "must not change the mesh: derivatives are taken by it"
+                    raise ModelError(name, value, allowed)
+                self._ways[name] = 0
 
     def values(
         self, runs: Sequence[FinishedRun], run: FinishedRun, outputs: Iterable[Output]
@@ -148,10 +153,10 @@ class IncrementalFamily(Family):
         for name, model in models.items():
             both = zip(system.model.bodies, model.bodies, strict=True)
             if not all(np.array_equal(one.mesh.p, two.mesh.p) for one, two in both):
-                self._moving.add(name)
+                self._wider.add(name)
         self._parameters = [run, *self.runs(run)]
         for name, parameters in zip(models, self._parameters[1:], strict=True):
-            if name in self._moving:  # its difference is wider
+            if name in self._wider:  # its difference is wider
                 models[name] = scene.model(parameters)
         systems = {name: System(model) for name, model in models.items()}
         self.followers = NeighbouringRuns(system, systems)

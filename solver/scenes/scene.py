@@ -174,14 +174,15 @@ class Scene:
 
         Parameters
         ----------
-        begun : `Record.state` of a run with a smaller value than all of these, to go on from
+        begun : `Record.state` of a run with a smaller value than all of these, to go on from;
+            without effect if runs have derivatives: their neighbours have no state
         """
         runs = [parameters]
         if self.branch:
             kind = type(getattr(self.parameters(), self.branch))
             runs = [replace(parameters, **{self.branch: kind(value)}) for value in sorted(values)]
         method: Method = self.method(runs[-1]) if self.method else _by_increments
-        method = partial(method, begun=begun) if begun else method
+        method = partial(method, begun=begun) if begun and not self.derivatives else method
         for each, run in zip(runs, method(self, runs, monitor), strict=True):
             yield replace(self.record(run), parameters=each)
         monitor(1.0)

@@ -36,7 +36,9 @@ from solver.materials import ArmstrongFrederick, Chaboche, Elasticity, TrescaMat
 from solver.mesh import grid
 from solver.results.record import Status
 from solver.rolling.passing import EXACT
+from solver.rolling.scenes import rail_passes
 from solver.rolling.scenes.rolling_endless import TrackPasses, load_on
+from solver.rolling.search import search
 from solver.scenes import Scene
 from solver.shipped import SCENES
 from studies.scenes.registry import scene_named
@@ -528,6 +530,66 @@ def test_a_neighbour_that_is_not_found_leaves_the_others(monkeypatch: pytest.Mon
 
 
 FOLLOW = TrackPasses.follow
+
+
+RAIL = {"accuracy": "draft", "traction": 0.3, "friction": 0.3}
+CHABOCHE = {"hardening": "chaboche", "back_stresses": ((4e4, 300.0), (5e3, 0.0))}
+IN_SPACE: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
+    "rail": ("wheel_rail", {**RAIL, "passes": 2, "lateral_position": -4.0}, ("lateral_position",)),
+    "recall": ("wheel_rail", {**RAIL, **CHABOCHE}, ("yield_stress", "load")),
+    # the nodes move with the size of the ellipse
+    "raceway": (
+        "raceway", {**RAIL, "friction": 0.1, "load_ratio": 1.8, "passes": 2},
+        ("friction", "load_ratio"),
+    ),
+}  # fmt: skip
+"""Scene, parameters, and parameters by which a run is derived."""
+
+
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_passes_in_space_have_the_derivatives_of_differences(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Relative to the number, or to its derivative times the parameter if that is larger."""
+    kind, given, by = IN_SPACE[name]
+    scene = SCENES[kind]
+    of = ("axle_height", "creepage", "peak_residual_tension", "max_plastic_strain")
+    parameters = scene.parameters(**given)
+    record = numbers(scene, parameters, by, of)
+    assert "derivative" not in record.message
+
+    def exactly(track: Any, law: Any, load: Any, *rest: Any, **how: Any) -> Any:
+        return search(track, law, load.exact, *rest, **how, tolerance=rail_passes.EXACT_ON_RAIL)
+
+    monkeypatch.setattr(rail_passes, "search", exactly)
+    for each in by:
+        value = getattr(parameters, each)
+        more, less = (
+            next(scene.path(changed, [changed.passes], lambda share: None)).scalars
+            for changed in (
+                replace(parameters, **{each: value * share}) for share in (1 + 1e-5, 1 - 1e-5)
+            )
+        )
+        changes = {one: (more[one] - less[one]) / 2e-5 for one in of}
+        assert max(abs(changes[one] / record.scalars[one]) for one in of) > 0.1
+        for one, expected in changes.items():
+            size = max(abs(record.scalars[one]), abs(expected))
+            off = abs(record.scalars[f"d_{one}_d_{each}"] * value - expected)
+            assert off < 5e-5 * size, (one, each)
+
+
+def test_passes_with_derivatives_do_not_go_on_from_a_run_without() -> None:
+    """A stored run has no state of its neighbours."""
+    scene = SCENES["wheel_rail"]
+    parameters, of = scene.parameters(**RAIL, passes=2), ("axle_height",)
+    first, second = scene.path(parameters, [1, 2], lambda share: None)
+    assert first.state
+    with_them = replace(scene, derivatives=Derivatives(by=("friction",), of=of))
+    (begun,) = with_them.path(parameters, [2], lambda share: None, begun=first.state)
+    whole = numbers(scene, parameters, ("friction",), of)
+    assert begun.scalars["axle_height"] == second.scalars["axle_height"]
+    name = "d_axle_height_d_friction"
+    assert begun.scalars[name] == whole.scalars[name] != 0
 
 
 def test_a_size_of_the_elements_of_a_track_is_refused() -> None:

@@ -80,7 +80,7 @@ OPEN, STICK, SLIP = map(int, PatchStatus)
 NORMAL, TANGENTS = 1, (0, 2)
 """Places of the normal and of the tangents among local axes (x, normal, tangent across)."""
 
-_TOLERANCE = 1e-9
+TOLERANCE = 1e-9
 """Tolerance: largest error of a condition over the largest pressure; for shear, over that times the
 steepest slope of the friction bound."""
 _STEPS = 60
@@ -149,7 +149,9 @@ class ConeSolution:
         return self._tangent.along(change)
 
 
-def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolution:
+def solve_cone(
+    problem: ConeProblem, values: Array, rigid: Array, tolerance: float = TOLERANCE
+) -> ConeSolution:
     """Return the solution, by Newton's method from these values (n, m, 3) and motions (k,).
 
     Raises
@@ -160,7 +162,7 @@ def solve_cone(problem: ConeProblem, values: Array, rigid: Array) -> ConeSolutio
     here, tangent = _Iterate(problem, values, rigid), None
     most = _LOST * abs(problem.resultants[0]) / np.abs(problem.weights[0]).max()
     for step in range(_STEPS):
-        if here.error <= _TOLERANCE * here.values[..., NORMAL].max():
+        if here.error <= tolerance * here.values[..., NORMAL].max():
             return ConeSolution(here, tangent, step)
         tangent = _Tangent(here)
 

@@ -32,6 +32,7 @@ from solver.rolling.rail.friction_cone import (
     NORMAL,
     OPEN,
     TANGENTS,
+    TOLERANCE,
     ConeProblem,
     ConeSolution,
     Influence,
@@ -49,6 +50,8 @@ pressure, shear)."""
 _PRESSED = 0.5
 """Interpenetration of the undeformed bodies at the edge of the contact, over their approach. For a
 ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
+_EXACT = 1e-12
+"""Tolerance of `solve_cone`, of contacts of which differences of 1e-6 are taken."""
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of the displacement at a station, at the one before and at the second before, in the
 slip."""
@@ -70,6 +73,7 @@ class RollingPatch(PatchLoad):
         left out
     strength : initial shear yield stress of the prism [MPa]
     load : force and motion; creepages and spin are those of `ProfiledWheel.rolling`
+    settled : tolerance of `solve_cone`
     """
 
     grid: PatchGrid
@@ -77,6 +81,12 @@ class RollingPatch(PatchLoad):
     wheel: ProfiledWheel
     friction: FrictionLaw
     strength: float = np.inf
+    settled: float = TOLERANCE
+
+    @property
+    def exact(self) -> Self:
+        """See `PassingLoad`."""
+        return self.changed(settled=_EXACT)
 
     def __post_init__(self) -> None:
         """Raise `ModelError` for arrays and numbers that do not fit."""
@@ -180,12 +190,13 @@ class RollingPatch(PatchLoad):
         problem = self._problem(u)
         if start is not None:
             try:
-                return solve_cone(problem, *self._known(start))
+                return solve_cone(problem, *self._known(start), self.settled)
             except NoContact:  # the contact may be elsewhere
                 pass
         smooth = self._smooth(problem)
         try:
-            found = solve_cone(problem, smooth.values, self._rolling_freely(problem, smooth))
+            rigid = self._rolling_freely(problem, smooth)
+            found = solve_cone(problem, smooth.values, rigid, self.settled)
         except NoContact:
             _check_rim(smooth.status)
             self._check_sliding(u)

@@ -41,32 +41,34 @@ class Passes(ABC):
     law : law of the material
     extent : size of the window in words, for the error if the largest window is too small
     beside : (pass) -> fields of a further body, None without
+    rounded : whether passes are known to ten digits only: derivatives take wider differences
     """
 
     parameters: Any
     law: Law
     extent = ""
     beside: Callable[[Pass[Any]], MeshFields] | None = None
+    rounded = False
 
     @abstractmethod
     def found(self, budget: SolveBudget) -> Iterator[Pass[Any]]:
         """Yield the passes behind those of `begin`; ``budget`` counts the solves of each."""
 
+    @abstractmethod
     def follow(self, beside: Pass[Any], last: Pass[Any] | None, number: int) -> Pass[Any]:
         """Return a pass, counted from 0, of a run whose parameters are almost those of another one.
 
-        It is solved to `EXACT`. A body whose runs have no derivatives cannot do this.
+        It is solved so exactly that differences can be taken.
 
         Parameters
         ----------
         beside : the same pass of the other run
         last : the pass before, None for the first one
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def same_mesh(self, parameters: Any) -> bool:
         """Return whether a run with other parameters can be followed on this mesh."""
-        raise NotImplementedError
 
     @abstractmethod
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
@@ -155,9 +157,8 @@ class _Path:
         self._state = state
         self._started = time.process_time() - (state["seconds"].item() if state else 0.0)
         self._elsewhere = 0.0
-        self._scene, self._family = scene, None
-        if scene.derivatives:
-            self._family = _Family(scene.derivatives, scene, last)
+        self._scene = scene
+        self._family: Any = None
         self._beside: list[_Path] = []
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
@@ -177,7 +178,9 @@ class _Path:
             self._traces, self._left = self._passes.begin(self._state)
             self._steps = self._state["steps"].astype(int).tolist()
         each = []
-        if self._family:
+        if asked := self._scene.derivatives:
+            wider = asked.by if self._passes.rounded else ()
+            self._family = _Family(asked, self._scene, self._last, wider)
             self._family.keep_mesh(self._last, self._passes.same_mesh)
             each = [self._last, *self._family.runs(self._last)]
         plain = replace(self._scene, derivatives=None)
@@ -242,7 +245,7 @@ class _Path:
             if (fields := passes.beside) is not None:
                 beside = partial(fields, found)
         seconds = self.seconds
-        runs = [run, *self._family.runs(run)] if self._family else []
+        runs: list[Any] = [run, *self._family.runs(run)] if self._family else []
         others = [other.finished(own) for other, own in zip(self._beside, runs, strict=False)]
 
         def check() -> Audit:

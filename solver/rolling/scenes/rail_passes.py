@@ -20,7 +20,7 @@ from solver.results.run import FinishedRun
 from solver.results.view import View
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
-from solver.rolling.passing import Pass, SolveBudget
+from solver.rolling.passing import Pass, SolveBudget, passing
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.track import PrismTrack
@@ -38,6 +38,8 @@ REACHES = (1.0, 1.4, 2.0)
 _TRIED = {"draft": "standard"}
 """The accuracy that is tried where another one is lost; finer ones than these need too much memory
 to be tried unasked."""
+EXACT_ON_RAIL = 1e-10
+"""Tolerance of passes of which differences of 1e-6 are taken; rounding of waves leaves 3e-11."""
 _SETTLED = 1
 """Largest number of Newton steps of a pass after which the next pass begins with its strain."""
 
@@ -112,11 +114,14 @@ class RailPasses(Passes):
     prism, load_on : of the scene
     """
 
+    rounded = True
+
     def __init__(
         self, prism: Prism, load_on: LoadOn, parameters: Any, view: View, reach: float
     ) -> None:
         self.parameters, self.law = parameters, parameters.material()
         self._each, self._load_on = parameters.each_pass(), load_on
+        self._prism, self._reach = prism, reach
         self._made: tuple[Any, PatchLoad] | None = None
         self._track = prism(parameters, reach)
         body = PrismBody(self._track, self.law, view.profile_body)
@@ -157,6 +162,23 @@ class RailPasses(Passes):
             before, start, last = found.after, found.loading.start, load
             guess = found.strain if found.steps <= _SETTLED else None
             yield found
+
+    def follow(
+        self, beside: Pass[PrismState], last: Pass[PrismState] | None, number: int
+    ) -> Pass[PrismState]:
+        """See `Passes`."""
+        state = last.after if last else self._track.virgin(self.law)
+        with one_thread():
+            return passing(
+                self._track, self.law, self.load(number).exact, state, beside.strain,
+                start=beside.loading.start, parts=beside.parts, tolerance=EXACT_ON_RAIL,
+            )  # fmt: skip
+
+    def same_mesh(self, parameters: Any) -> bool:
+        """See `Passes`. Nodes may move, but not become more or fewer."""
+        one, other = self._track, self._prism(parameters, self._reach)
+        counts = [(track.weights.shape, track.grid.stations) for track in (one, other)]
+        return counts[0] == counts[1] and np.array_equal(one.section.dofs, other.section.dofs)
 
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
         """See `Passes`."""

@@ -95,4 +95,5 @@ def rail_scene(
         effort=effort,
         setup=geometry,
         advice=advice,
+        derives=0.9,
     )
