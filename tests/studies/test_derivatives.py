@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from solver import SCENES
 from studies import Store, Study, StudyError, fit, open_study
 from studies.execution.estimate import estimate
 from studies.scenes.description import Description
+from studies.scenes.entries import derived
 from studies.scenes.scene import file_scene, read_scene
 from studies.views.elasticities import elasticities
 from studies.views.tables import elasticity_table, runs_table
@@ -128,9 +131,10 @@ def test_mistakes_name_their_entry(derivatives: Any, field: str, allowed: str) -
     assert allowed in caught.value.allowed
 
 
-def test_a_scene_of_steady_passes_refuses_them() -> None:
+def test_a_scene_whose_own_method_has_none_refuses_them() -> None:
+    scene = replace(SCENES["wheel_rail"], derives=0.0)
     with pytest.raises(StudyError, match="must be left out: runs of wheel_rail"):
-        punched(scene="wheel_rail", derivatives={"by": ["friction"], "of": ["residual_max"]})
+        derived(scene, {"by": ["friction"], "of": ["residual_max"]})
 
 
 def test_an_estimate_counts_them(store: Store) -> None:
