@@ -50,7 +50,7 @@ from solver.loading.stepper import Stepper, Way, placed
 from solver.tensors import principal
 from solver.typing import Array, Ints
 
-_TIGHT = Tolerances(residual=1e-13, contact=1e-12)
+_TIGHT = Tolerances(residual=1e-12, contact=1e-12)
 """Of an increment of which differences of 1e-6 are taken."""
 _NOISE = 1e-10
 """Change of a number in a neighbouring run, over its scale: a smaller one may be rounding."""
