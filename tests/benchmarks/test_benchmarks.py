@@ -36,19 +36,24 @@ TINY = punch.Plan(
 )
 
 
-QUICK = (of_walls, of_steady, of_rolling, of_prism, of_accuracy)
+QUICK = (of_steady, of_rolling, of_prism, of_accuracy)
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a benchmark of two Hertz meshes, four punches, and the quick other problems."""
+    """Folder of a benchmark of two Hertz meshes and of thick walls."""
     out = tmp_path_factory.mktemp("benchmarks")
-    problems = (
-        partial(of_hertz, out, ("quad4",), (4, 8), 1),
-        partial(of_punch, out, TINY, 1),
-        *(partial(of, out, quick=True, repeats=1) for of in QUICK),
-    )
-    benchmark(out, problems)
+    hertz = partial(of_hertz, out, ("quad4",), (4, 8), 1)
+    benchmark(out, (hertz, partial(of_walls, out, quick=True, repeats=1)))
+    return out
+
+
+@pytest.fixture(scope="module")
+def longer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a benchmark of four punches and the quick other problems."""
+    out = tmp_path_factory.mktemp("longer")
+    others = (partial(of, out, quick=True, repeats=1) for of in QUICK)
+    benchmark(out, (partial(of_punch, out, TINY, 1), *others))
     return out
 
 
@@ -68,21 +73,24 @@ def test_errors_of_hertz_contact_halve_with_the_mesh(written: Path) -> None:
     assert hertz["quad4 a/8"]["error of pressure"] < 0.6 * hertz["quad4 a/4"]["error of pressure"]
 
 
-def test_errors_of_a_steady_pass_fall_with_the_mesh(written: Path) -> None:
-    steady = rows(written / "steady.csv")
+@pytest.mark.long
+def test_errors_of_a_steady_pass_fall_with_the_mesh(longer: Path) -> None:
+    steady = rows(longer / "steady.csv")
     for depth in (2, 5):
         coarse, fine = (steady[f"mesh {h} mm, free"][f"error of {depth} mm"] for h in (4, 2))
         assert fine < 0.8 * coarse, depth
 
 
-def test_errors_of_rolling_by_increments_fall_with_the_mesh(written: Path) -> None:
-    rolling = rows(written / "rolling.csv")
+@pytest.mark.long
+def test_errors_of_rolling_by_increments_fall_with_the_mesh(longer: Path) -> None:
+    rolling = rows(longer / "rolling.csv")
     coarse, fine = (rolling[f"mesh {h} mm, free"]["error of first row"] for h in (4, 2))
     assert 0 < fine < 0.8 * coarse
 
 
-def test_errors_of_a_pass_over_a_prism_fall_with_the_elements(written: Path) -> None:
-    prism = rows(written / "prism.csv")
+@pytest.mark.long
+def test_errors_of_a_pass_over_a_prism_fall_with_the_elements(longer: Path) -> None:
+    prism = rows(longer / "prism.csv")
     coarse, fine = (prism[f"section {h} mm, ellipse"] for h in ("3.33", "2"))
     for measure in ("mean", "largest"):
         assert 0 < fine[f"error of {measure}"] < 0.7 * coarse[f"error of {measure}"]
@@ -106,9 +114,10 @@ def test_errors_of_thick_walls_fall_with_the_mesh_at_the_order_of_the_element(
     assert f"({np.log2(coarse / fine):.1f})" in line
 
 
-def test_a_level_of_accuracy_has_an_error_against_a_finer_run(written: Path) -> None:
+@pytest.mark.long
+def test_a_level_of_accuracy_has_an_error_against_a_finer_run(longer: Path) -> None:
     """Draft against sides of two thirds, from 1 mm down and at the first row: some percent."""
-    (draft,) = rows(written / "accuracy.csv").values()
+    (draft,) = rows(longer / "accuracy.csv").values()
     assert 1.0 < draft["error of largest"] < 15.0
 
 
@@ -146,8 +155,9 @@ def test_the_exponent_of_growth_is_that_of_a_power() -> None:
     assert growth.exponent(points) == pytest.approx(1.3)
 
 
-def test_errors_of_the_punch_are_distances_from_its_references(written: Path) -> None:
-    punches = rows(written / "punch.csv")
+@pytest.mark.long
+def test_errors_of_the_punch_are_distances_from_its_references(longer: Path) -> None:
+    punches = rows(longer / "punch.csv")
     finest, mesh, step = (
         punches[name] for name in ("finest reference", "mesh base", "load_step 0.1")
     )
@@ -165,22 +175,24 @@ def test_errors_of_the_punch_are_distances_from_its_references(written: Path) ->
 
 
 def test_every_figure_and_the_table_are_written(written: Path) -> None:
-    assert {path.name for path in written.glob("*.png")} == {
-        "hertz.png",
+    names = {path.name for path in written.glob("*.png")}
+    assert names == {"hertz.png", "walls-cylinder.png", "walls-sphere.png"}
+    assert "one thread used" in (written / "table.txt").read_text()
+
+
+@pytest.mark.long
+def test_so_are_those_of_what_takes_longer(longer: Path) -> None:
+    assert {path.name for path in longer.glob("*.png")} == {
         "punch-mesh.png",
         "punch-element.png",
         "punch-increments.png",
         "punch-solver.png",
-        "walls-cylinder.png",
-        "walls-sphere.png",
         "rolling-free.png",
         "accuracy.png",
         "prism-ellipse.png",
         "steady-free.png",
     }
-    text = (written / "table.txt").read_text()
-    assert "one thread used" in text
-    assert "superlu" in text
+    assert "superlu" in (longer / "table.txt").read_text()
 
 
 def test_short_runs_are_repeated_and_their_median_is_taken() -> None:
