@@ -69,8 +69,17 @@ def integrated(law: Chaboche, path: list[np.ndarray]) -> np.ndarray:
     return y[:4]
 
 
-@pytest.mark.parametrize("path", ["tension", "tension, then cyclic shear"])
-@pytest.mark.parametrize("name", OWN)
+TURNED = "tension, then cyclic shear"
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        *((name, "tension") for name in OWN),
+        ("burlet cailletaud", TURNED),
+        pytest.param("ohno wang", TURNED, marks=pytest.mark.long),
+    ],
+)
 def test_a_rule_of_ones_own_follows_its_rates(name: str, path: str) -> None:
     law = chaboche(name)
     wanted = integrated(law, PATHS[path])

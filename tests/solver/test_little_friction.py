@@ -35,7 +35,7 @@ def residual(record):
 
 
 @pytest.mark.solves
-@pytest.mark.parametrize("friction", [1e-3, 1e-4, 1e-5, 1e-7, 1e-9, 1e-13])
+@pytest.mark.parametrize("friction", [1e-3, 1e-5, 1e-9, 1e-13])
 def test_a_free_wheel_rolls_however_small_friction_is(friction):
     """In as many increments as without; residual stress differs by some p0 times friction."""
     without, run = rolled(0.0), rolled(friction)
@@ -48,9 +48,8 @@ def test_a_free_wheel_rolls_however_small_friction_is(friction):
 
 
 @pytest.mark.solves
-@pytest.mark.parametrize("friction", [1e-5, 1e-9])
-@pytest.mark.parametrize("traction", [-0.9, 0.5, 1.0])
-def test_a_driven_wheel_has_its_share_of_little_friction(friction, traction):
+@pytest.mark.parametrize(("traction", "friction"), [(-0.9, 1e-5), (0.5, 1e-9), (1.0, 1e-5)])
+def test_a_driven_wheel_has_its_share_of_little_friction(traction, friction):
     run = rolled(friction, traction=traction)
     force = traction * friction * run.parameters.force
     # a moment acts on the radius less the approach of the bodies and the strain of the rim

@@ -33,7 +33,6 @@ def stress(system, outcome):
     ("share", "changed"),
     [
         (0.85, {"advance_step": 3.0, "track": 24.0}),
-        (0.85, {"advance_step": 1.5}),
         (0.85, {"advance_step": 1.5, "traction": 0.75}),
         (0.85, {"advance_step": 1.5, "heading": "backward", "traction": -0.5}),
     ],

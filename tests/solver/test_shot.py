@@ -34,7 +34,10 @@ def pressed(friction: float, depth: float, steps: int) -> Solution:
     return solve(model, control=PathControl(load_step=1 / steps))
 
 
-@pytest.mark.parametrize(("friction", "depth", "steps"), [(0.2, 0.02, 40), (0.5, 0.01, 20)])
+@pytest.mark.parametrize(
+    ("friction", "depth", "steps"),
+    [pytest.param(0.2, 0.02, 40, marks=pytest.mark.long), (0.5, 0.01, 20)],
+)
 def test_a_ball_is_pressed_in_without_an_increment_cut(
     friction: float, depth: float, steps: int
 ) -> None:

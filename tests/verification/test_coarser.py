@@ -128,16 +128,15 @@ Run = Callable[[Path, int, int], tuple[Record, Errors]]
 
 
 CASES = [
-    (run, steps, sides)
+    pytest.param(run, steps, sides, id=f"{run.__name__}-{steps}x-{sides}x",
+                 marks=[pytest.mark.long] if (run, steps) == (pressed_pad, 1) else [])
     for run in (pressed_pad, ball, pin_in_hole, rolling)
     for steps, sides in ((1, 1), (2, 1), (4, 1), (2, 2))
     if (run, sides) != (pin_in_hole, 2)
-]
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("run", "steps", "sides"), CASES, ids=[f"{run.__name__}-{n}x-{k}x" for run, n, k in CASES]
-)
+@pytest.mark.parametrize(("run", "steps", "sides"), CASES)
 def test_coarser_is_right_or_not_ok(run: Run, steps: int, sides: int, tmp_path: Path) -> None:
     record, errors = run(tmp_path, steps, sides)
     if (steps, sides) == (1, 1):

@@ -17,7 +17,7 @@ from tests.records import kept
 from tests.reference.wedge import singular_power, sticking_friction
 
 SCENE = scene_named("elastic_punch")
-FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.4)
+FRICTIONS = (0.0, 0.2, 0.4)
 COARSE: dict[str, Any] = {"accuracy": "draft", "half_plane_size": 20.0}
 
 MESH = 1e-3
@@ -46,7 +46,7 @@ def test_frictionless_corner_has_the_power_of_dundurs_and_lee(runs: dict[float, 
 def test_friction_lowers_the_power_as_the_wedge_problem_says(
     runs: dict[float, Record], friction: float
 ) -> None:
-    """Measured 0.7251, 0.6800, 0.6378, 0.5975 against 0.7249, 0.6799, 0.6380, 0.5983."""
+    """Measured 0.6800, 0.5975 against 0.6799, 0.5983."""
     found = runs[friction].scalars
     exact = singular_power(friction, slip="outward")
     assert abs(found["singular_power"] - exact) < min(1e-3, found["singular_power_error"])
@@ -78,11 +78,11 @@ def test_what_sticks_grows_with_friction(runs: dict[float, Record]) -> None:
     found = [runs[friction].scalars["stick_half_width"] for friction in FRICTIONS]
     assert found[0] == 0.0
     assert (np.diff(found) > 0).all()
-    assert found[1:] == pytest.approx([1.1, 14.3, 32.5, 45.8], abs=0.3)  # half an element: 0.25
+    assert found[1:] == pytest.approx([14.3, 45.8], abs=0.3)  # half an element: 0.25
 
 
 def test_fields_are_proportional_to_the_load(runs: dict[float, Record]) -> None:
-    one, other = runs[0.3], run(250.0, friction=0.3)
+    one, other = runs[0.4], run(250.0, friction=0.4)
     for name in ("contact_pressure", "contact_shear", "stress_difference"):
         (_, small), (_, large) = one.fields[name], other.fields[name]
         np.testing.assert_allclose(large, 2.5 * small, rtol=1e-6, atol=1e-6 * np.nanmax(large))
@@ -102,24 +102,18 @@ def test_one_increment_is_exact_also_with_friction() -> None:
 
 def test_tractions_do_not_depend_on_the_elastic_constants() -> None:
     """Bodies of the same material under given forces: J.H. Michell, Proc. LMS 31 (1899) 100-124."""
-    steel, other, stress = (
-        run(friction=0.2, **COARSE, **changes)
-        for changes in (
-            {},
-            {"poisson_ratio": 0.1, "youngs_modulus": 7e4},
-            {"state": "plane_stress"},
-        )
-    )
+    changes = {"poisson_ratio": 0.1, "youngs_modulus": 7e4, "state": "plane_stress"}
+    steel, other = (run(friction=0.2, **COARSE, **own) for own in ({}, changes))
     far = steel.coordinates["s"] < 50.0 * 0.99  # twenty elements and more from the corner
     (_, expected) = steel.fields["contact_pressure"]
-    for each in (other, stress):
-        _, pressure = each.fields["contact_pressure"]
-        np.testing.assert_allclose(pressure[0, far], expected[0, far], rtol=1e-3)
-        assert each.scalars["singular_power"] == pytest.approx(
-            steel.scalars["singular_power"], abs=1e-3
-        )
+    _, pressure = other.fields["contact_pressure"]
+    np.testing.assert_allclose(pressure[0, far], expected[0, far], rtol=1e-3)
+    assert other.scalars["singular_power"] == pytest.approx(
+        steel.scalars["singular_power"], abs=1e-3
+    )
 
 
+@pytest.mark.long
 def test_a_groove_in_the_half_plane_leaves_the_corner_its_power_and_takes_its_intensity() -> None:
     """What the thesis plots (fig. 4.16) is the power that the pressure seems to have."""
     distances = (2.5, 1.1, 0.6)
@@ -144,6 +138,7 @@ def test_a_groove_that_begins_at_the_corner_takes_the_singularity_away(friction:
     assert abs(found["singular_power"] - 1.0) < found["singular_power_error"]
 
 
+@pytest.mark.long
 def test_a_groove_in_the_punch_takes_intensity_until_the_corner_lifts_off() -> None:
     heights = (4.0, 2.0, 0.75)
     records = [run(punch_groove=0.2, eta=eta, friction=0.1, **COARSE) for eta in heights]

@@ -14,7 +14,9 @@ from studies.scenes.scene import file_scene
 FILE = Path(__file__).parents[1] / "studies" / "scenes" / "everything.toml"
 
 
-@pytest.mark.parametrize(("parts", "turn"), [(1, 1e-2), (10, 1e-3)])
+@pytest.mark.parametrize(
+    ("parts", "turn"), [(1, 1e-2), pytest.param(10, 1e-3, marks=pytest.mark.long)]
+)
 def test_a_scene_of_everything_is_ok_once_its_contacts_are_resolved(
     parts: int, turn: float
 ) -> None:

@@ -88,6 +88,7 @@ def test_creep_coefficients_of_kalker_are_met_on_one_grid(axes: tuple[float, flo
     assert abs(errors[2]) < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("axes", KALKER)
 def test_creep_coefficients_have_hardly_an_error_of_first_order(axes: tuple[float, float]) -> None:
     """Errors of twenty grids, with a / h from 6 to 18: 0.05 h / a in the mean, 0.1 h / a for C23.

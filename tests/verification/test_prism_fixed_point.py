@@ -7,7 +7,7 @@ strain is given, as the pass assumes it there.
 
 What is left is the elements' share: elements of 1 mm, of the block that is twice as wide, leave 5 %
 of the change after one increment without hardening and 4 % after two; elements of 2 mm with
-stations of 2 mm 11 and 12 %.
+stations of 2 mm 11 and 12 %. `test_prism_increments.py` has increments from nothing to the pass.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ from solver.rolling.rail.patch_contact import PatchContact
 from solver.rolling.rail.track import PrismTrack
 from tests.verification.bricks import Bricks, BrickState
 from tests.verification.prism_blocks import AHEAD, HARDENS, PERFECT, block, ellipse
+
+pytestmark = pytest.mark.long
 
 Array = NDArray[np.float64]
 SPACING, INCREMENTS = 1.0, 2

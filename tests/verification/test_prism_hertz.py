@@ -1,8 +1,12 @@
-"""Elastic stress under a given pressure on a prism: against Boussinesq, and its first yield."""
+"""Elastic stress under a given pressure on a prism: against Boussinesq, and its first yield.
+
+`test_prism_elastic.py` has stress under an ellipse on larger elements, in less time.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from solver.rolling.load import RollingLoad
@@ -11,6 +15,8 @@ from solver.rolling.rail.track import PrismField, PrismTrack
 from solver.tensors import to_tensor, von_mises
 from tests.verification.closed_forms import HertzEllipse
 from tests.verification.prism_blocks import PERFECT, A, B, block
+
+pytestmark = pytest.mark.long
 
 Array = NDArray[np.float64]
 

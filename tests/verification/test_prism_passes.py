@@ -152,6 +152,7 @@ def strip(
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_strip_held_across_has_the_pass_of_plane_strain() -> None:
     """With a shear of -0.09 p, within 3 MPa from 1 mm down.
 
@@ -175,6 +176,7 @@ def test_a_strip_held_across_has_the_pass_of_plane_strain() -> None:
     assert left.accumulated.max() == pytest.approx(plane.accumulated.max(), rel=0.03)
 
 
+@pytest.mark.long
 def test_divided_rows_above_halve_the_elements_where_plastic_strain_is_steep() -> None:
     """Of the yield stress, from 1 mm down: 3.6 % with elements of 1 mm, 0.7 with divided rows.
 

@@ -3,6 +3,7 @@
 A.R.S. Ponter, A.D. Hearle, K.L. Johnson, J. Mech. Phys. Solids 33 (1985) 339-362: it shakes down up
 to a largest pressure of 4.675 k, k the yield stress in shear. That is an upper bound, from the
 shear that alternates on planes through the axle's direction; residual stress cannot change it.
+`test_raceway.py` has a ball far below it and far above.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from solver.linear.solvers import one_thread
@@ -18,6 +20,8 @@ from solver.rolling.passing import passing
 from solver.rolling.rail.patch_contact import EllipticPatch
 from solver.rolling.rail.track import PrismTrack
 from tests.verification.prism_blocks import PERFECT, RE, block
+
+pytestmark = pytest.mark.long
 
 RADIUS, PASSES = 7.0, 6
 

@@ -27,6 +27,7 @@ def test_the_pressure_under_a_rigid_roller_is_that_of_hertz() -> None:
     assert record.scalars["peak_pressure"] == pytest.approx(exact, rel=0.006)
 
 
+@pytest.mark.long
 def test_first_flow_under_a_growing_contact_is_divided_or_its_error_is_stated() -> None:
     """In one increment the pressure is 7 % off, which a straight path of strain does not show."""
 

@@ -377,6 +377,7 @@ def test_a_wheel_that_is_turned_by_more_than_full_slip_bears_spins():
     assert -found.loading.moment < 0.995 * full
 
 
+@pytest.mark.long
 def test_what_hardens_has_no_limit_but_leaves_small_strain_theory():
     """All five passes are made: each strains more, on and on."""
     record = roll(

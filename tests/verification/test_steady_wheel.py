@@ -161,6 +161,7 @@ def locked(pressure, friction, size):
     return next(iter(rolling(place, material, load, [1]))), material, place
 
 
+@pytest.mark.long
 def test_a_locked_wheel_flattens_its_contact_until_the_surface_bears_the_shear():
     found, material, place = locked(2.3, 0.5, 2.0)  # 1.15 times what the surface bears
     touching = found.loading

@@ -3,6 +3,7 @@
 In increments material stands still, and nothing is assumed to be steady: the wheel is set down,
 rolled and taken off. Rail, stations, and far field are the same. A wheel that is held across moves
 the rail, which is soft that way, aside for metres; so it has the lateral force of the pass.
+`test_prism_increments.py` has increments of a small block in less time.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from solver.rolling.scenes.wheel_rail_setup import load_on
 from solver.rolling.scenes.wheel_rail_track import geometry, track_of
 from tests.verification.stepped_patch import SteppedPatch
 from tests.verification.stepped_prism import SteppedIncrement, SteppedPrism
+
+pytestmark = pytest.mark.long
 
 STEPS = 37
 ACCELERATING = WheelRailParameters(

@@ -51,6 +51,7 @@ def test_a_nearly_incompressible_cylinder_is_that_of_its_shear_stress(a: float) 
         assert body.audit().passed
 
 
+@pytest.mark.long
 def test_the_limit_load_of_a_strip_is_that_of_prandtl() -> None:
     """(2 + pi) k; measured 1.0047 to 1.0063, as of von Mises."""
     law = ideal(20.0, 0.45)
