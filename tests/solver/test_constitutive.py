@@ -16,7 +16,7 @@ every_law = pytest.mark.parametrize(("law", "n_components"), LAWS.values(), ids=
 
 
 @cache
-def random_history(law, n_components, n_points=300, seed=1):
+def random_history(law, n_components, n_points=150, seed=1):
     """A state after two random plastic steps, and a strain that yields it further.
 
     Once for all tests: no law changes what it is given, as one of them proves.
