@@ -248,7 +248,7 @@ def locked_wheel(shear_limit, element_size):
     parameters = RollingParameters(
         traction=1.0,
         track=6.0,
-        growth=1.4,
+        growth=2.0,
         element_size=element_size,
         advance_step=3.0,
         press_steps=2,

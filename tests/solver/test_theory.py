@@ -156,7 +156,9 @@ def test_a_run_outside_theory_has_a_status_of_its_own_and_keeps_its_numbers() ->
 
 
 def test_a_limit_load_is_told_by_the_parameter_of_the_scene() -> None:
-    parameters = SCENES["punch"].parameters(accuracy="draft", load_ratio=1.5, load_step=0.5)
+    parameters = SCENES["punch"].parameters(
+        smallest_element=0.05, growth=2.5, load_ratio=1.5, load_step=0.5
+    )
     (record,) = SCENES["punch"].path(parameters, [1.5], lambda share: None)
     assert record.status is Status.LIMIT_LOAD
     assert "no equilibrium between load_ratio 0.9" in record.message
