@@ -34,7 +34,7 @@ Fault = Callable[[Patch], None]
 
 PUNCH: dict[str, Any] = {
     "smallest_element": 0.04, "growth": 2.0, "friction": 0.3, "load_ratio": 0.8571,
-    "load_step": 0.2, "hardening": "isotropic",
+    "load_step": 0.3, "unload_steps": 2, "hardening": "isotropic",
 }  # fmt: skip
 ROLLING: dict[str, Any] = {
     "element_size": 3.0, "advance_step": 3.0, "growth": 1.5, "track": 9.0, "press_steps": 2,
@@ -312,7 +312,9 @@ MUTATIONS: dict[str, Mutation] = {
         breaks=("law",),
         parameters={"hardening": "kinematic"},
     ),
-    "flow forgotten between increments": Mutation(fault=forgotten_flow, breaks=("energy",)),
+    "flow forgotten between increments": Mutation(
+        fault=forgotten_flow, breaks=("energy",), parameters={"load_step": 0.2, "unload_steps": 5}
+    ),
     "no hoop strain": Mutation(
         fault=no_hoop_strain, breaks=("law",), parameters={"state": "axisymmetric"}
     ),
