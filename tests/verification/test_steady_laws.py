@@ -11,7 +11,6 @@ import subprocess
 import sys
 from dataclasses import replace
 from functools import cache
-from itertools import cycle
 from math import sqrt
 from pathlib import Path
 
@@ -267,7 +266,7 @@ WORDS = {
 
 
 @pytest.mark.parametrize(
-    ("word", "load"), list(zip(WORDS, cycle(["contact", "hertz"]), strict=False))
+    ("word", "load"), [*((word, "hertz") for word in WORDS), ("chaboche", "contact")]
 )
 def test_every_word_rolls_and_its_audit_agrees(word, load):
     p = RollingParameters(
@@ -284,7 +283,7 @@ def test_every_word_rolls_and_its_audit_agrees(word, load):
 @cache
 def _two():
     p = RollingParameters(
-        element_size=3.0, growth=1.5, traction=0.3, load="hertz", **WORDS["chaboche"]
+        element_size=4.0, growth=2.0, traction=0.3, load="hertz", **WORDS["chaboche"]
     )
     track = track_for(p)
     first, second = rolling(track, p.material(), load_on(track, p, p), [1, -1])
