@@ -99,6 +99,7 @@ def test_wear_and_slip_are_those_of_half_a_cycle(record: Record) -> None:
     assert found["slip_share"] == pytest.approx(share, abs=0.03)
 
 
+@pytest.mark.long
 def test_fretting_does_not_depend_on_the_slave_but_by_its_tension(
     record: Record, tmp_path: Path
 ) -> None:
