@@ -97,6 +97,7 @@ class Rules:
         self.numbers: Sequence[RequestedNumber] = self.places.numbers if self.places else ()
         self.plain = cache(self._plain)
         self.fields = cache(self._fields)
+        self.acting = cache(self._acting)
         self.located = cache(
             lambda body, at: Located(self.plain(body), np.frombuffer(at).reshape(self.axes, -1))
         )
@@ -321,7 +322,7 @@ class Rules:
             return self.contact(kind)
         own, allowed = [], []
         for stage, stored in zip(self.view.stages, self.stored(f"contact_{kind}"), strict=True):
-            acting = self._acting(stage)
+            acting = self.acting(stage)
             values, scale = (
                 getattr(acting, kind),
                 max(acting.peak, LEAST_STRAIN * self.stress_scale),
@@ -337,7 +338,7 @@ class Rules:
         return Own(np.stack(own), np.stack(allowed))
 
     def peak(self) -> Own:
-        found = self._acting(self.view.loaded).peak
+        found = self.acting(self.view.loaded).peak
         return Own(found if len(self.axis("s")) else np.nan, LIMIT * found)
 
     def half_width(self) -> Own:
@@ -345,7 +346,7 @@ class Rules:
 
         The edge of contact is found from gaps.
         """
-        found = self._acting(self.view.loaded)
+        found = self.acting(self.view.loaded)
         own, aside = (found.most + found.least) / 2, (found.most - found.least) / 2
         limit = MEASURED if found.measured else LIMIT
         return Own(own if len(self.axis("s")) else np.nan, aside + limit * found.most)
