@@ -122,7 +122,7 @@ def leaned(slave: str, aside: float, increments: int) -> Solution:
 
 @pytest.mark.parametrize(
     ("slave", "aside", "claimed"),
-    [("plane", 0.15, 0.02), ("arm", 0.08, 0.03), ("plane", 0.5, 0.03), ("arm", 0.35, 0.07)],
+    [("plane", 0.15, 0.02), ("arm", 0.35, 0.07)],
 )
 def test_what_passes_has_the_shear_of_small_increments(
     slave: str, aside: float, claimed: float
@@ -133,7 +133,7 @@ def test_what_passes_has_the_shear_of_small_increments(
     share of all friction, was 0.15 in a single increment that was not divided, and 0.29 where 85 %
     of the friction acts; both passed their audit.
     """
-    exact = leaned(slave, aside, 24).stages["loaded"].state.contacts[0]
+    exact = leaned(slave, aside, 20).stages["loaded"].state.contacts[0]
     for increments, most in ((1, claimed), (2, claimed), (8, 0.02)):
         found = leaned(slave, aside, increments)
         contact = found.stages["loaded"].state.contacts[0]
