@@ -168,7 +168,7 @@ def test_a_rotation_larger_than_small_moves_points_on_circles() -> None:
     assert at[:, 0] == pytest.approx([5 * np.cos(angle), 5 * np.sin(angle) - 0.5])
 
 
-@pytest.mark.parametrize("turn", [0.6, 2.5, -2.5])
+@pytest.mark.parametrize("turn", [0.6, -2.5])
 def test_a_turn_in_one_increment_is_divided(turn: float) -> None:
     """A roller turned on a block drags it: as much in one increment of the program as in many."""
     block = Body(name="block", mesh=grid(np.linspace(-2.0, 2.0, 17), np.linspace(-2.0, 0.0, 9)),
@@ -239,7 +239,7 @@ def test_models_with_bad_rigid_bodies_are_refused() -> None:
 @pytest.mark.divides
 @pytest.mark.parametrize("steps", [1, 10])
 def test_a_ball_that_is_moved_comes_and_goes_in_any_number_of_increments(steps: int) -> None:
-    x = graded(20.0, 0.1, 1.3, 5.0)
+    x = graded(20.0, 0.2, 1.5, 5.0)
     block = Body(name="block", mesh=grid(x, -x[::-1]), kinematics="axisymmetric",
                  material=Material(youngs_modulus=2e5, poisson_ratio=0.3, yield_stress=400.0),
                  supports={"left": "x", "bottom": "xy"})  # fmt: skip
