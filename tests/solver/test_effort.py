@@ -66,7 +66,7 @@ def test_those_of_a_track_without_ends_are_told_too(changes: dict[str, Any]) -> 
     [
         ("punch", COARSE | {"yield_stress": 300.0}, [0.5]),
         ("punch", COARSE | {"friction": 0.2, "unload_steps": 3}, [0.9, 0.6]),
-        ("rolling", ROUGH | {"load": "hertz", "friction": 0.0}, [1, 2]),
+        ("rolling", ROUGH | {"load": "hertz", "friction": 0.0, "track": 25.0}, [1, 2]),
         ("rolling", ENDLESS, [2, 5]),
         ("rolling", ROUGH | {"load": "hertz", "press_steps": 3, "advance_step": 8.0}, [1]),
     ],

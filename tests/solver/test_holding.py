@@ -52,8 +52,10 @@ def pushed(push: float, stages: Any = STAGES, **own: Any) -> Solution:
     return solve(Model(bodies=(shaft, hub), contacts=(pair,)), stages=stages)
 
 
-@pytest.mark.parametrize("sliding", ["small", "finite"])
-@pytest.mark.parametrize("own", [{"friction": 0.1}, {"friction": 0.05, "cohesion": 8.0}])
+@pytest.mark.parametrize(
+    ("own", "sliding"),
+    [({"friction": 0.1}, "small"), ({"friction": 0.05, "cohesion": 8.0}, "finite")],
+)
 def test_a_fit_is_pushed_off_by_as_much_as_friction_bears(
     own: dict[str, Any], sliding: str
 ) -> None:

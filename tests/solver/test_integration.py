@@ -137,8 +137,9 @@ def flow(rule: Any, start: float, end: float) -> float:
     return sum(quad(lambda X: 1 / slope(X), *way)[0] for way in ways)
 
 
-@pytest.mark.parametrize("steps", [1, 5])
-@pytest.mark.parametrize("name", RULES)
+@pytest.mark.parametrize(
+    ("name", "steps"), [*((name, 1) for name in RULES), ("armstrong frederick", 5)]
+)
 def test_a_bar_ratchets_by_the_integrated_rate_in_any_number_of_increments(name: str, steps: int):
     """Back stress goes between Re above the lower and Re below the higher stress."""
     Re, high, low = 200.0, 320.0, -280.0

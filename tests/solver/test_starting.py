@@ -114,9 +114,7 @@ def test_a_body_on_one_point_is_held_by_its_friction(gap, sliding):
 # -- limits ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("ratio", "elastic_punch"), [(1e-6, False), (1e-4, False), (1e-6, True), (1e-4, True)]
-)
+@pytest.mark.parametrize(("ratio", "elastic_punch"), [(1e-6, False), (1e-4, True)])
 def test_a_body_that_hardens_has_no_limit_load(ratio, elastic_punch):
     """Above the limit without hardening strains are huge: what fails is not equilibrium."""
     parameters = PUNCH.parameters(
