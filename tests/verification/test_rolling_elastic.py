@@ -260,11 +260,9 @@ def creepage_ratio(stiffness, lightly):
     return run.creepage / Stuck.of(run.parameters).creepage(run.parameters)
 
 
-@pytest.mark.parametrize("stiffness", [1 / 3, 9.0])
-def test_free_creepage_of_dissimilar_rollers_is_bentall_and_johnsons(stiffness):
-    """The wheel that pressure shortens more turns more: negative creepage of a soft wheel."""
+def test_free_creepage_of_dissimilar_rollers_is_bentall_and_johnsons():
     # a / R is 0.6 %: what is left is about 1.5 a / R, and half a per cent of mesh
-    assert creepage_ratio(stiffness, 1 / 4) == pytest.approx(1.0, rel=0.025)
+    assert creepage_ratio(9.0, 1 / 4) == pytest.approx(1.0, rel=0.025)
 
 
 def test_free_creepage_tends_to_that_of_half_planes_with_the_load():
@@ -273,8 +271,12 @@ def test_free_creepage_tends_to_that_of_half_planes_with_the_load():
 
 @pytest.mark.parametrize(("stiffness", "widths"), [(1 / 3, 3.2), (3.0, _STEADY)])
 def test_shear_of_dissimilar_rollers_has_no_resultant_and_the_sign_of_minus_beta(stiffness, widths):
-    """The stiffer wheel holds the track back from shortening: outward shear on the track."""
+    """The stiffer wheel holds the track back from shortening: outward shear on the track.
+
+    The wheel that pressure shortens more turns more: negative creepage of a soft wheel.
+    """
     run = rolled(7, stiffness=stiffness, widths=widths)
+    assert np.sign(run.creepage) == np.sign(stiffness - 1)
     assert abs(run.force) < 1e-4 * run.parameters.force
     exact = PEAK * Stuck.of(run.parameters).shear(run.x)
     for side in (-1, 1):
