@@ -45,8 +45,7 @@ def law(word: str, condition: str = "mises") -> Law:
 
 
 LAWS: dict[str, Law] = {
-    # the first four words are one compiled law, which mixes both; chaboche has the curve of voce
-    **{word: law(word) for word in WORDS if word not in ("isotropic", "kinematic", "voce")},
+    **{word: law(word) for word in WORDS},
     "tresca": law("voce", "tresca"),
     "hosford": SmoothMaterial(
         elasticity=PERFECT.elasticity,
@@ -95,7 +94,8 @@ def compared(own: PrismTrack, material: Law) -> None:
     assert audit.passed, audit.violations
 
 
-@pytest.mark.parametrize("name", LAWS)
+# the first four words are one compiled law, which mixes both; tresca has the curve of voce
+@pytest.mark.parametrize("name", [n for n in LAWS if n not in ("isotropic", "kinematic", "voce")])
 def test_increments_of_any_law_leave_the_state_of_its_pass(name: str) -> None:
     compared(track(), LAWS[name])
 
