@@ -29,8 +29,8 @@ LONG = ("cones",)
 """Studies of several minutes, which are computed only by name."""
 HEADING = re.compile(r"(?P<name>\w+)(?: \[(?P<unit>[^]]+)\])?")
 TABLE = r"(<!-- compared {} -->\n)(?:\|.*\n)*"
-MOST = 16
-"""Largest number of values of a source that stand in a table one by one."""
+MOST = 18
+"""Largest number of lines of a table; sources with more values have none."""
 LONGEST = 40
 """Numbers of values from which a picture has them in the order of the file, without a line."""
 LABELLED = 4
@@ -112,7 +112,9 @@ def whole(table: pd.DataFrame) -> str:
 
 
 def single(table: pd.DataFrame) -> str:
-    """Return a table of a source: a line for each value."""
+    """Return a table of a source: a line for each value, or for each curve if none is published."""
+    if table["value"].isna().all():
+        return curves(table)
     found = "| where | quantity | published | sigma | computed | difference |\n"
     found += "|---|---|---|---|---|---|\n"
     for row in table.itertuples():
@@ -127,10 +129,29 @@ def single(table: pd.DataFrame) -> str:
     return found
 
 
+def curves(table: pd.DataFrame) -> str:
+    """Return a table of computed values: a column for each last place."""
+    rows = table.assign(
+        computed=[text(each.computed, each.unit) for each in table.itertuples()],
+        where=table["at"].str.rpartition(", ")[0],
+        last=table["at"].str.rpartition(" ")[2].astype(int),
+    )
+    wide = rows.pivot(index=["quantity", "where"], columns="last", values="computed")
+    found = f"| where | quantity | {' | '.join(map(str, wide))} |\n"
+    found += f"{'|---' * (2 + wide.shape[1])}|\n"
+    for quantity, where in dict.fromkeys(zip(rows["quantity"], rows["where"], strict=True)):
+        found += f"| {where} | `{quantity}` | {' | '.join(wide.loc[quantity, where])} |\n"
+    return found
+
+
 def written(page: str, table: pd.DataFrame) -> str:
     """Return the page with the tables of what was compared."""
     made = {"all": whole(table)}
-    made |= {name: single(rows) for name, rows in table.groupby("source") if len(rows) <= MOST}
+    made |= {
+        name: lines
+        for name, rows in table.groupby("source")
+        if (lines := single(rows)).count("\n") <= MOST
+    }
     for name, lines in made.items():
         page = re.sub(TABLE.format(name), rf"\g<1>{lines}", page)
     return page

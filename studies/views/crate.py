@@ -392,12 +392,17 @@ def _action(run_id: str, attrs: Mapping[str, Any], status: str, message: str) ->
     """Return the action that computed a run: it failed if the run has no results."""
     failed = status not in SOLVED
     error = {"error": f"{status}: {message}".removesuffix(": ")} if failed else {}
-    began = {"startTime": attrs["run_started"]} if "run_started" in attrs else {}
+    ended = attrs.get("run_ended", attrs["created"])
+    began = {"startTime": _time(attrs["run_started"])} if "run_started" in attrs else {}
     return _entity(
         f"#run-{run_id}", "CreateAction", name=f"computation of the run {run_id}", **began,
-        endTime=attrs.get("run_ended", attrs["created"]),
-        actionStatus=_FAILED if failed else _COMPLETED, **error,
+        endTime=_time(ended), actionStatus=_FAILED if failed else _COMPLETED, **error,
     )  # fmt: skip
+
+
+def _time(given: str) -> str:
+    """Return a time as the profiles have it: with an offset, not Z."""
+    return given.replace("Z", "+00:00")
 
 
 def _formal(own: str, name: str, kind: str, examples: list[Entity], words: str) -> Entity:

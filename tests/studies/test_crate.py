@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from functools import partial
 from hashlib import sha256
@@ -79,6 +80,8 @@ at = 0.007
 between = [0.1, 2.0]
 within = 0.1
 """
+TIME = r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{3})?\+\d\d:\d\d"
+"""Times as Process Run Crate 0.5 has them."""
 PROFILES = "https://w3id.org/ro/wfrun/process/0.5", "https://w3id.org/ro/wfrun/workflow/0.5"
 
 
@@ -171,6 +174,7 @@ def test_each_run_is_an_action_with_its_parameters_and_its_error(crate: Path) ->
         assert each["actionStatus"] == f"http://schema.org/{state}ActionStatus"
         assert each.get("error", "").startswith("limit_load: ") == failed
         assert each["startTime"] <= each["endTime"]
+        assert all(re.fullmatch(TIME, each[name]) for name in ("startTime", "endTime"))
         assert [*references(each["instrument"])] == ["study.toml"]
         assert [*references(each["result"])] == [f"runs/{run_id}.nc"]
         objects = [known[own] for own in references(each["object"])]

@@ -67,6 +67,7 @@ def half_space_section(
 def block(
     h: float = 2.0, length: float = 64.0, spacing: float | None = None, far: float = 75.0,
     growth: float = 1.4, levels: int = 0, zone_depth: float = 14.0,
+    loads: int = 1,
 ) -> PrismTrack:  # fmt: skip
     """A block of `half_space_section`; stations ``spacing`` apart, h if None.
 
@@ -76,7 +77,7 @@ def block(
     zone = small & (section.points[1].mean(axis=1) > -zone_depth)
     return PrismTrack(
         section, zone, "running", length=length, spacing=spacing or h, ahead=AHEAD, behind=24.0,
-        reach=10.0, levels=levels,
+        reach=10.0, levels=levels, loads=loads,
     )  # fmt: skip
 
 

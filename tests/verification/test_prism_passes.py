@@ -19,6 +19,7 @@ from solver.materials import (
 )  # fmt: skip
 from solver.materials.law import Law
 from solver.mesh import grid
+from solver.rolling.audit.rail import audit_prism
 from solver.rolling.load import RollingLoad
 from solver.rolling.passing import Pass, passing
 from solver.rolling.plane.track import track_of
@@ -285,6 +286,20 @@ def test_the_error_of_the_length_falls_when_it_doubles() -> None:
     assert short < 0.04
     assert long < short / 4
     assert far < 0.7 * short
+
+
+def test_equal_loads_on_a_longer_length_are_one_on_a_length_and_pass_the_audit() -> None:
+    """Elastic fields and contact compliance are those of the prism that repeats itself."""
+    one, three = block(length=64.0), block(length=192.0, loads=3)
+    load = ellipse(one, 1360.0)
+    traction = load.solve(np.zeros((one.grid.stations, len(one.grid.z), 3))).traction
+    both = [track.strain(track.at_rest.loaded(traction)) for track in (one, three)]
+    np.testing.assert_allclose(both[1], both[0], atol=1e-12 * np.abs(both[0]).max())
+    np.testing.assert_allclose(three.compliance[:32], one.compliance, rtol=1e-9, atol=1e-18)
+    found = rolled(three, PERFECT, ellipse(three, 1360.0))
+    audit = audit_prism(three, PERFECT, found, None)
+    assert found.after.accumulated.max() > 1e-4
+    assert audit.figures["audit_residual"] < 1e-9 and audit.figures["audit_steadiness"] < 1e-3
 
 
 def test_a_zone_that_is_too_small_is_told() -> None:

@@ -209,6 +209,17 @@ def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch
     assert record.scalars["max_plastic_strain"] == free().scalars["max_plastic_strain"]
 
 
+@pytest.mark.parametrize("distance", [29.0, 30.0, 120.0])
+def test_wheels_stand_on_whole_numbers_of_stations_and_share_the_rail(distance: float) -> None:
+    own = geometry(WheelRailParameters(wheel_distance=distance, accuracy="draft"))
+    between = distance / own.spacing
+    assert between == pytest.approx(round(between)) and 0.9 * 2.0 <= own.spacing <= 2.0
+    assert 2 * own.waves % round(between) == 0
+    assert sum(own.window) <= round(between), "each material point passes one wheel"
+    alone = geometry(WheelRailParameters(accuracy="draft"))
+    assert own.waves >= alone.waves and alone.spacing == 2.0
+
+
 def test_the_effort_is_that_of_the_run() -> None:
     _, third = rolled(passes=(1, 3))
     assert SCENE.effort is not None
@@ -292,6 +303,7 @@ def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
         ({"given_creepage": 0.01}, r"given_creepage = 0\.01: needs control = creepage"),
         ({"initial_stress": "over_height"}, r"stress_over_height = \(\): must be given"),
         ({"load": 0.0}, r"load = 0\.0: must be greater than 0"),
+        ({"span": 2400.0, "wheel_distance": 60.0}, r"wheel_distance = 60\.0: needs span = endless"),
     ],
 )
 def test_parameters_that_do_not_fit_are_refused(given: dict[str, Any], told: str) -> None:

@@ -387,7 +387,8 @@ class PlainPrism:
         each = traction.swapaxes(0, 1).reshape(len(self.width), -1)
         nodal = (self._hats.T @ each).reshape(-1, len(traction), 3)
         forces[:, self.track.near] = nodal.swapaxes(1, 2).reshape(self._n, -1)
-        return forces
+        apart = forces.shape[1] // self.track.loads
+        return np.sum([np.roll(forces, k * apart, 1) for k in range(self.track.loads)], axis=0)
 
     def surface(self, found: Waves, traction: Array) -> Array:
         """Return the displacement (n, m, 3) of the grid, with that of the far field [mm]."""

@@ -53,6 +53,7 @@ class Modes:
     window : number of stations, from station 0 on, with forces and results; all by default
     behind : (n - window,) factors with which the eigenstress of the last station of the window goes
         on at the stations behind it; by default there is none
+    loads : number of equal forces on the rows, L / loads apart; the first ones are in the window
     surface : (n_rows, section.n) rows of the displacements wanted at the surface; a force on a row
         acts by its transpose. All entries of a row are along x, or none. By default there are none
 
@@ -86,6 +87,7 @@ class Modes:
         *,
         window: int | None = None,
         behind: Sequence[float] | Array = (),
+        loads: int = 1,
         surface: sparse.csr_array | None = None,
     ) -> None:
         window = stations if window is None else window
@@ -107,6 +109,8 @@ class Modes:
         self._force0 = sparse.csc_array(self.B0.T @ areas)
         self._force1 = sparse.csc_array(self.B1.T @ areas)
         self._set_rows(surface, zone)
+        # equal forces at equal distances leave every loads-th wave
+        self._loads = np.where(np.arange(stations // 2 + 1) % loads, 0.0, float(loads))
         self.behind = np.asarray(behind, dtype=float)
         self._set_transforms(window, self.behind)
         self._factors, self._carried = _factorised(
@@ -118,7 +122,7 @@ class Modes:
         """The same waves, in single precision."""
         other, kind = copy(self), np.dtype(np.float32)
         other.precision = kind
-        for name in ("B0", "B1", "_force0", "_force1", "rows", "_twice_k"):
+        for name in ("B0", "B1", "_force0", "_force1", "rows", "_twice_k", "_loads"):
             setattr(other, name, getattr(self, name).astype(kind))
         other.columns = self.columns  # few of them are read at a time
         for name in ("_into", "_into_behind", "_back"):
@@ -240,7 +244,8 @@ class Modes:
         apart = -self.length / self.stations * np.arange(self.stations)
         phase = np.outer(self.wavenumbers, apart)
         amplitudes = self.compliance.swapaxes(0, 1)
-        return superposed(amplitudes, phase, self._share, self.along, self.along)
+        share = self._share * self._loads
+        return superposed(amplitudes, phase, share, self.along, self.along)
 
     def nodal(self, eigenstress: Array) -> Array:
         """Return the nodal forces (waves, 2, m) of an eigenstress (n_points, window, 6) [N/mm].
@@ -293,7 +298,8 @@ class Modes:
     def _of_rows(self, forces: Array) -> Array:
         """Return the amplitudes (n_rows, 2 waves) of forces (n_rows, window)."""
         plain, carrying = self._into
-        return np.where(self.along[:, None], forces @ carrying, forces @ plain)
+        each = np.where(self.along[:, None], forces @ carrying, forces @ plain)
+        return np.asarray(each * np.repeat(self._loads, 2))
 
     def _rows_at_stations(self, amplitudes: Array) -> Array:
         """Return the displacements (n_rows, window) of amplitudes (n_rows, 2 waves)."""

@@ -39,6 +39,7 @@ class PrismTrack:
     ahead, behind : the window extends from x = ahead to x = -behind [mm]
     reach : half the length of the surface where the load may act [mm]
     levels : levels of the far field; with 0 the prism repeats itself
+    loads : number of equal loads on the length, at equal distances; plastic strain is that of one
     span : length of a prism that is clamped at both ends, the load in its middle [mm]; None if it
         is endless
 
@@ -49,6 +50,7 @@ class PrismTrack:
     before : number of the station at x = 0, where a load is
     weights : (n_points, window) volume of the points [mm3]
     grid : stations and vertices where the load may act
+    loads : number of equal loads on the length
     rim : numbers of the points beside elements outside the zone, which must not yield
     initial : initial stress, None without
 
@@ -70,6 +72,7 @@ class PrismTrack:
         behind: float,
         reach: float,
         levels: int,
+        loads: int = 1,
         span: float | None = None,
     ) -> None:
         stations, before = round(length / spacing), round(ahead / spacing)
@@ -77,16 +80,16 @@ class PrismTrack:
         if window > stations:
             raise ModelError("length", length, f"must be at least {window * spacing:g} mm")
         near = int(round(reach / spacing, 6))
-        if 2 * near > min(before, window - 1 - before):
-            allowed = "must be at most half of what the window has ahead and behind"
+        if (2 if levels else 1) * near > min(before, window - 1 - before):
+            allowed = "must be at most what the window has ahead and behind, with far field half"
             raise ModelError("reach", reach, allowed)
         self.section, self.boundary, self.before = section, boundary, before
-        self._near = near
+        self._near, self.loads = near, loads
         surface = RunningSurface(section, boundary)
         self.grid = surface.grid(spacing, near * spacing, 2 * near + 1)
         self.modes = Modes(
             section, zone, length, stations, window=window,
-            behind=_fading(stations - window), surface=surface.rows(self.grid),
+            behind=_fading(stations - window), loads=loads, surface=surface.rows(self.grid),
         )  # fmt: skip
         if span is not None and not levels:
             raise ModelError("span", span, "needs levels of far field")

@@ -92,6 +92,7 @@ class PrismGeometry(ABC):
     spacing : distance of stations [mm]
     reach : half the length where the load is expected to act [mm]; it may act as far as the window
         allows, since yielding makes a contact longer ahead
+    apart : distance of equal loads, a multiple of ``spacing`` [mm]; None of a load that is alone
     """
 
     elasticity: tuple[float, float]
@@ -101,6 +102,7 @@ class PrismGeometry(ABC):
     split: int
     spacing: float
     reach: float
+    apart: float | None = None
 
     @property
     @abstractmethod
@@ -116,7 +118,23 @@ class PrismGeometry(ABC):
     @property
     def waves(self) -> int:
         """Number of stations in half the length after which waves repeat."""
-        return self.stations(max(_LENGTH, _WIDE * self.half_width / self.reach) / 2)
+        least = self.stations(max(_LENGTH, _WIDE * self.half_width / self.reach) / 2)
+        step = self._between // math.gcd(2, self._between) or 1
+        return step * math.ceil(least / step)
+
+    @property
+    def _between(self) -> int:
+        """Number of stations from load to load; 0 of a load that is alone."""
+        return round((self.apart or 0.0) / self.spacing)
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """Number of stations of the window ahead of the load and behind, none nearer to others."""
+        ahead, behind = self.stations(_AHEAD), self.stations(_BEHIND)
+        if self._between:
+            half = self._between // 2
+            return min(ahead, half), min(behind, self._between - half)
+        return ahead, behind
 
     def track(
         self,
@@ -130,20 +148,22 @@ class PrismGeometry(ABC):
 
         Parameters
         ----------
-        levels : levels of the far field
+        levels : levels of the far field of a load that is alone
         length : after which waves repeat [mm]; by default long enough for a pass
         span : length of a prism clamped at both ends [mm]; None if it is endless
         """
+        ahead, behind = self.window
         return PrismTrack(
             section,
             np.arange(len(section.weights)) < self.elements,
             "running",
             length=length or 2 * self.waves * self.spacing,
             spacing=self.spacing,
-            ahead=self.stations(_AHEAD) * self.spacing,
-            behind=self.stations(_BEHIND) * self.spacing,
-            reach=self.stations(_AHEAD) // 2 * self.spacing,
-            levels=levels,
+            ahead=ahead * self.spacing,
+            behind=behind * self.spacing,
+            reach=min(self.stations(_AHEAD) // 2, ahead) * self.spacing,
+            levels=0 if self._between else levels,
+            loads=2 * self.waves // self._between if self._between else 1,
             span=span,
         )
 
@@ -154,7 +174,7 @@ class PrismGeometry(ABC):
 
         If the loads are scattered, ever heavier ones come along, ever more rarely.
         """
-        count, window = int(max(passes)), self.stations(_AHEAD) + self.stations(_BEHIND) + 1
+        count, window = int(max(passes)), sum(self.window) + 1
         zone = len(np.unique(section.dofs[: self.elements]))
         factorised = (self.waves + 1) * zone
         still = _STILL + _POINT * section.weights[: self.elements].size * window

@@ -11,6 +11,7 @@ P. Marek, PhD thesis, Warsaw University of Technology (1995), chapter 6.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
@@ -120,6 +121,12 @@ class WheelRailParameters(PrismParameters):
         "endless",
         "length of a rail whose ends neither move nor turn, the wheel in its middle; or endless",
     )
+    wheel_distance: Annotated[
+        Annotated[float, Interval(ge=20.0, le=1000.0)] | Literal["alone"], Unit("mm")
+    ] = described(
+        "alone",
+        "distance of equal wheels, one behind the other, all on the rail in each pass; or alone",
+    )
     initial_stress: str = described(
         "none", "stress of the rail before the first pass; it is brought to equilibrium"
     )
@@ -165,6 +172,8 @@ class WheelRailParameters(PrismParameters):
         self._check_head()
         _ = self.rail_stress  # raises an error for parameters that do not fit together
         self._check_lateral()
+        if self.wheel_distance != "alone" and self.span != "endless":
+            raise ModelError("wheel_distance", self.wheel_distance, "needs span = endless")
         if self.scattered:
             check_spreads(self, _SPREADS)
         if self.sequence:
@@ -277,8 +286,10 @@ class WheelRailParameters(PrismParameters):
 
     @property
     def spacing(self) -> float:
-        """Distance of stations along the rail [mm]."""
-        return max(self.element_size, _CLOSEST)
+        """Distance of stations along the rail [mm], of which a distance of wheels is a multiple."""
+        most = max(self.element_size, _CLOSEST)
+        apart = most if self.wheel_distance == "alone" else float(self.wheel_distance)
+        return apart / math.ceil(round(apart / most, 6))
 
 
 (_geometry,) = late("rolling.scenes.wheel_rail_track", "geometry")

@@ -149,6 +149,7 @@ def _geometry(parameters: WheelRailParameters, reach: float) -> RailGeometry:
         else min(split_rows(p, mean, h), round(depth / h)),
         spacing=p.spacing,
         reach=whole(reach * (_REACH * contact.along + contact.ahead), p.spacing),
+        apart=None if p.wheel_distance == "alone" else float(p.wheel_distance),
     )
 
 
