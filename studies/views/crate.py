@@ -316,7 +316,7 @@ class _Writer:
         own = f"#{what}-{seal.digest_of(value.encode())[:12]}"
         if own not in self.used:
             self.used.add(own)
-            self._add(own, "PropertyValue", name=what, value=value)
+            self._add(own, "PropertyValue", name=what, propertyID=what, value=value)
         return own
 
     def _whole(self, study: str, given: list[str], dataset: str, runs: list[Entity]) -> str:

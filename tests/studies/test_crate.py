@@ -181,8 +181,8 @@ def test_each_run_is_an_action_with_its_parameters_and_its_error(crate: Path) ->
         names = {one["name"]: one["value"] for one in objects if one["@type"] == "PropertyValue"}
         assert names == {name: given[name] for name in ("pull", "strength")}
         assert any(one["@id"].endswith("/block.inp") for one in objects)
-        used = [known[own]["name"] for own in references(each["resourceUsage"])]
-        assert used == ["machine", "peak-memory"]
+        used = [known[own] for own in references(each["resourceUsage"])]
+        assert [one["propertyID"] for one in used] == ["machine", "peak-memory"]
     assert {each["actionStatus"][18:] for each in runs} == {
         "CompletedActionStatus", "FailedActionStatus"
     }  # fmt: skip

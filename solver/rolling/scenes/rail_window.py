@@ -35,7 +35,9 @@ length where the load is expected to act."""
 _WIDE = 4 / 3
 """Least length after which waves repeat, over half the width of the zone: the far field includes
 the loads beyond it by their resultants alone. The pressure of a Hertz ellipse with a ratio of
-semi-axes of 25 then has an error of 0.1 %; with half the length it has 1.4 %, with a third 4 %."""
+semi-axes of 25 then has an error of 0.1 %; with half the length it has 1.4 %, with a third 4 %.
+Of loads at a distance from each other waves repeat after twice the length, with no far field:
+plastic strain fades over it, see docs/measured.md."""
 _LEAST = 4
 """Least number of elements in half a zone or reach."""
 _UPPER = 0.35
@@ -118,7 +120,8 @@ class PrismGeometry(ABC):
     @property
     def waves(self) -> int:
         """Number of stations in half the length after which waves repeat."""
-        least = self.stations(max(_LENGTH, _WIDE * self.half_width / self.reach) / 2)
+        length = max(_LENGTH, _WIDE * self.half_width / self.reach)
+        least = self.stations(length if self._between else length / 2)
         step = self._between // math.gcd(2, self._between) or 1
         return step * math.ceil(least / step)
 
