@@ -48,7 +48,7 @@ docs: setup ## write the reference of the public names as HTML into build/docs
 gallery: setup ## compute and draw the pictures of docs/gallery.md that take minutes
 	$(BIN)/python docs/pictures/make.py
 
-measured: setup ## compute, compare and draw what stands in docs/measured.md (5 minutes of processor time)
+measured: setup ## compute, compare and draw what stands in docs/measured.md (8 minutes of processor time)
 	$(BIN)/python docs/pictures/measured.py
 
 bench: setup ## draw CPU time against error

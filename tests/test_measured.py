@@ -70,6 +70,16 @@ def test_values_are_taken_at_labels_parameters_and_places_in_the_unit_of_the_fil
         PROGRAM["compared"]("own", dataset.isel(run=2))
 
 
+def test_a_source_of_which_nothing_is_published_has_a_line_for_each_curve() -> None:
+    rows = [(f"d {d}, passes {k}", "strain", d + k) for d in (30, 60) for k in (1, 10)]
+    table = pd.DataFrame(rows, columns=["at", "quantity", "computed"]).assign(
+        value=np.nan, unit="1"
+    )
+    head, _, *lines = PROGRAM["single"](table).splitlines()
+    assert head == "| where | quantity | 1 | 10 |"
+    assert lines == ["| d 30 | `strain` | 31 | 40 |", "| d 60 | `strain` | 61 | 70 |"]
+
+
 @pytest.mark.pages
 def test_the_cheapest_source_computes_what_is_stored(tmp_path: Path) -> None:
     study = str(DATA / "bent-beam.toml")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +34,9 @@ MOST = 18
 """Largest number of lines of a table; sources with more values have none."""
 LONGEST = 40
 """Numbers of values from which a picture has them in the order of the file, without a line."""
-LABELLED = 4
-"""Largest number of curves of a panel that have their places beside them."""
+LINES = "-", "--", ":", "-."
+LABELLED = len(LINES)
+"""Largest number of curves of a panel that have their places in a legend."""
 OURS, THEIRS = "#D55E00", "0.35"
 
 
@@ -149,7 +151,7 @@ def written(page: str, table: pd.DataFrame) -> str:
     made = {"all": whole(table)}
     made |= {
         name: lines
-        for name, rows in table.groupby("source")
+        for name, rows in table.fillna({"at": ""}).groupby("source")
         if (lines := single(rows)).count("\n") <= MOST
     }
     for name, lines in made.items():
@@ -172,12 +174,15 @@ def drawn(table: pd.DataFrame) -> Figure:
         curve = not words and len(rows) < LONGEST
         x = np.array([of for _, of in last] if curve else range(len(rows)), dtype=float)
         above.errorbar(x, rows["value"], rows["sigma"], fmt="o", color=THEIRS, ms=4, zorder=3)
-        groups = rows.assign(x=x).groupby(rows["at"].map(lambda at: place(at[:-1])))
-        for label, own in groups:
-            style = ".-" if curve else "_"
-            above.plot(own["x"], own["computed"], style, color=OURS, ms=6 if curve else 14, mew=2)
-            if 1 < len(groups) <= LABELLED:
-                above.annotate(label, (own["x"].iloc[-1], own["computed"].iloc[-1]), va="bottom")
+        same = set.intersection(*(set(at[:-1]) for at in rows["at"]))
+        names = [place([of for of in at[:-1] if of not in same]) for at in rows["at"]]
+        groups = rows.assign(x=x).groupby(names, sort=False)
+        for (label, own), line in zip(groups, cycle(LINES), strict=False):
+            style = f".{line}" if curve else "_"
+            size = 6 if curve else 14
+            above.plot(own["x"], own["computed"], style, color=OURS, ms=size, mew=2, label=label)
+        if 1 < len(groups) <= LABELLED:
+            above.legend(fontsize=6, frameon=False)
         for axes in below:
             axes.plot(x, rows["difference"], "o", color=THEIRS, ms=3)
             axes.axhline(0.0, color="0.2", linewidth=0.8)
