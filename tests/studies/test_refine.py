@@ -365,7 +365,7 @@ def test_an_interrupted_refinement_goes_on_and_asks_for_the_same_runs(tmp_path: 
     asked = study({"of": [OF, PRESSURE], "halvings": 1}, scene=WHOLE, trouble="limit")
     at_once = search_here(asked, Store(tmp_path / "a"))
     store, parts = Store(tmp_path / "b"), []
-    while some := search_here(asked, store, most=7):
+    while some := search_here(asked, store, most=14):
         parts += some
     assert sorted(parts) == sorted(at_once), "the same runs, and none twice"
     with open_study(tmp_path / "a") as one, open_study(tmp_path / "b") as other:
