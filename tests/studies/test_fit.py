@@ -253,7 +253,7 @@ def test_an_interrupted_fit_goes_on_and_asks_for_the_same_runs(tmp_path: Path) -
     one = study(measured(0.02))
     at_once = fit_here(one, Store(tmp_path / "a"))
     store, parts = Store(tmp_path / "b"), []
-    while some := fit_here(one, store, most=5):
+    while some := fit_here(one, store, most=8):
         parts += some
     assert sorted(parts) == sorted(at_once), "the same runs, and none twice"
     with open_study(tmp_path / "a") as a, open_study(tmp_path / "b") as b:
