@@ -102,7 +102,7 @@ def test_three_starts_find_the_least_number_under_a_condition(
 
 def test_a_failed_run_is_stored_and_the_search_goes_on(tmp_path: Path) -> None:
     outcome = run_study(
-        study(first={"load_ratio": 1.1, "friction": 0.6}), Store(tmp_path), workers=0
+        study(first={"load_ratio": 1.1, "friction": 0.6}, starts=1), Store(tmp_path), workers=0
     )
     assert {status for _, status, _ in outcome.failed} == {"limit_load"}
     found, _ = found_in(tmp_path)
@@ -142,7 +142,7 @@ def test_each_place_of_an_axis_has_a_minimum(tmp_path: Path) -> None:
 
 @pytest.mark.processes
 def test_a_killed_search_is_taken_up_and_computes_no_run_twice(tmp_path: Path) -> None:
-    slow = study(replace(SCENE, records=slowly), most=15)
+    slow = study(replace(SCENE, records=slowly), most=9)
     before = runs_before_a_kill(slow, tmp_path / "killed", 4)
     after = run_study(slow, Store(tmp_path / "killed"), workers=0).computed
     whole = run_study(slow, Store(tmp_path / "whole"), workers=0).computed
