@@ -45,7 +45,7 @@ def distance(found: Record, wanted: Record, name: str) -> float:
     return float(np.nanmean(np.abs(a - b)) / np.nanmean(np.abs(b)))
 
 
-@pytest.mark.parametrize("rule", ["isotropic", "kinematic"])
+@pytest.mark.parametrize("rule", [pytest.param("isotropic", marks=pytest.mark.long), "kinematic"])
 def test_the_punch_as_a_file_is_as_far_from_a_finer_one_as_the_built_in_scene(rule: str) -> None:
     values = {"load_ratio": 0.5714, "friction": 0.3, "hardening": rule}
     own = one("punch.toml", **values)
