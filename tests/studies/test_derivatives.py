@@ -177,6 +177,7 @@ components = "y"
 STRAINED = (0.2, 0.5, 1.0, -0.2, -1.0, 0.4, 1.0)
 
 
+@pytest.mark.long
 @pytest.mark.solves
 def test_four_parameters_are_fitted_by_a_fifth_of_the_runs_of_differences(store: Store) -> None:
     """By differences the same fit takes 47 runs."""
