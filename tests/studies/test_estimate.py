@@ -105,6 +105,7 @@ def test_the_pace_is_that_of_past_runs(store: Store, outliers: int) -> None:
     assert f"{len(figures)} runs of punch" in found.basis
 
 
+@pytest.mark.long
 @pytest.mark.solves
 @pytest.mark.divides
 def test_own_scenes_take_as_long_as_estimated(tmp_path: Path) -> None:
@@ -207,7 +208,10 @@ print(1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status)[1]))
 
 
 @pytest.mark.processes
-@pytest.mark.parametrize("scene", ["punch", "rolling", "raceway"])
+@pytest.mark.parametrize(
+    "scene",
+    ["punch", *(pytest.param(each, marks=pytest.mark.long) for each in ("rolling", "raceway"))],
+)
 def test_the_memory_told_is_that_of_a_worker(
     scene: str, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
