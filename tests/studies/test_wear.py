@@ -115,6 +115,7 @@ def test_a_rigid_slave_has_no_tension() -> None:
     assert found["slip_length"] == pytest.approx(0.2, rel=0.01)
 
 
+@pytest.mark.long
 @pytest.mark.solves
 def test_tension_is_that_of_the_surface_though_the_slave_is_condensed() -> None:
     content = sliding()
