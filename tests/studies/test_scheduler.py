@@ -187,6 +187,7 @@ def test_that_a_scheduler_is_waited_for_is_reported_once(
     ]
 
 
+@pytest.mark.long
 def test_a_worker_that_does_not_see_the_directory_computes_nothing(
     stage: Stage, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
