@@ -319,6 +319,7 @@ def test_the_three_processes_compute_a_posted_study(stage: Stage) -> None:
         assert dataset["max_plastic_strain"].sel(load_ratio=0.5).values.tolist() == [[0.5], [0.5]]
 
 
+@pytest.mark.long
 def test_a_scheduler_that_restarts_costs_no_study(stage: Stage) -> None:
     study = fake_study("interrupted", seconds=0.3)
     study["sweep"]["friction"] = [0.0, 0.1, 0.2]
