@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import psutil
+import pytest
 
 from tests.service.servers import NOWHERE, Server, fake_study, wait_until
 
@@ -36,6 +37,7 @@ def test_what_two_studies_share_is_computed_once(lively: Server) -> None:
     assert len([line for line in lively.computed() if '"seconds": 0.4' in line]) == 6
 
 
+@pytest.mark.long
 def test_the_greater_priority_goes_first(mortal: Server, service: Server) -> None:
     """Both services have one worker, which tells what it computes where the first one has it."""
     mortal.settings = service.settings | {"RESIDUA_STUDIES_AT_ONCE": "1"}
@@ -57,6 +59,7 @@ def test_the_greater_priority_goes_first(mortal: Server, service: Server) -> Non
         assert refused.json()["errors"][0]["field"] == "priority"
 
 
+@pytest.mark.long
 def test_the_death_of_the_workers_process_is_made_good(lively: Server) -> None:
     before = len(lively.computed())
     study_id = lively.post(large_study("orphaned", paths=12, seconds=0.3))
