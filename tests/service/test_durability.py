@@ -110,6 +110,7 @@ def punch_study(frictions: int) -> dict[str, Any]:
     }
 
 
+@pytest.mark.long
 def test_a_study_of_the_punch_outlives_a_service_that_is_killed(mortal: Server) -> None:
     mortal.workers = 2
     mortal.start()
@@ -217,6 +218,7 @@ def test_a_temporary_folder_that_a_kill_leaves_is_removed_at_the_next_start(
     assert mortal.finished(study)["status"] == "successful"
 
 
+@pytest.mark.long
 def test_a_copy_of_the_directory_is_restored_with_studies_that_ran_and_waited(
     mortal: Server, tmp_path: Path
 ) -> None:
