@@ -3,8 +3,9 @@
 ``solves`` is for tests that compute a state of a model, ``processes`` for tests that start another
 process, ``pages`` for tests that run the code of a page or an example, which may do both.
 
-``long`` is for tests of a figure that take more than 4 s of CPU and have a quicker neighbour which
-runs the same code: ``make test`` and ``make check`` leave them out, ``make stress`` runs them.
+``long`` is for tests of a figure that take more than 4 s of CPU, or start services and wait for
+more than 10 s, and have a quicker neighbour which runs the same code: ``make test`` and
+``make check`` leave them out, ``make stress`` runs them.
 
 In the folders `UNDIVIDED` a test without the mark ``divides`` solves in the increments that it
 gives, which takes half the time. In all others the program divides them as for its users.
