@@ -24,9 +24,10 @@ FIRST = (
             "test_docs.py",
             "verification/test_steady_laws.py",
             "test_examples.py",
+            "stability/test_scenes.py",
+            "verification/test_derivatives.py",
             "verification/test_mutations.py",
             "verification/test_rolling_table.py",
-            "service/test_durability.py",
             "verification/test_rolling_endless.py",
             "verification/test_punch.py",
             "solver/test_shot.py",
@@ -37,23 +38,37 @@ FIRST = (
             "verification/test_ball.py",
             "verification/test_large_bodies.py",
             "studies/test_derivatives.py",
-            "studies/test_own_parts.py",
+            "service/test_durability.py",
             "verification/test_contact_in_time.py",
             "studies/plots/test_many.py",
             "verification/test_coarser.py",
-            "studies/test_kill.py",
-            "stability/test_scenes.py",
             "verification/test_rolling_elastic.py",
-            "studies/test_grid.py",
             "verification/test_fretting.py",
             "verification/test_wheel_rail.py",
             "verification/test_prism_passes.py",
+            "studies/test_grid.py",
+            "studies/test_names.py",
+            "studies/test_crate.py",
+            "studies/scenes/test_mistakes.py",
+            "studies/test_kill.py",
+            "studies/test_wear.py",
+            "studies/test_minimise.py",
+            "studies/plots/test_maps.py",
+            "studies/test_scheduler.py",
+            "studies/test_fatigue.py",
+            "studies/test_traffic.py",
+            "studies/test_refine.py",
+            "studies/test_own_parts.py",
+            "studies/test_combine.py",
+            "studies/test_predict.py",
             "studies/test_run.py",
+            "studies/test_part.py",
         )
     ),
 )
 """Units that take long, in the order in which they start: no core waits for them at the end. One
-that starts processes and waits for them comes after some that compute."""
+that starts processes and waits for them comes after some that compute: `TOGETHER` waits too, and
+when it is about to end others take turns with those that compute."""
 
 
 class Order(LoadFileScheduling):
