@@ -67,7 +67,10 @@ def test_the_cells_of_a_notebook_run_after_make_run(
 ) -> None:
     """They run on a coarse and small form of the study that `make run` computes."""
     study = (ROOT / "data/studies/punch.toml").read_text()
-    coarse = '[parameters]\naccuracy = "draft"\nsmallest_element = 0.1\ngrowth = 3.0'
+    coarse = (
+        '[parameters]\naccuracy = "draft"\nsmallest_element = 0.1\ngrowth = 3.0\n'
+        "load_step = 0.25\nunload_steps = 1"
+    )
     study = study.replace("[parameters]", coarse)
     study = study.replace("[0.0, 0.1, 0.2, 0.3, 0.4]", "[0.0, 0.2]")
     study = study.replace('["none", "isotropic", "kinematic"]', '["isotropic", "kinematic"]')
