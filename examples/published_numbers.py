@@ -18,7 +18,7 @@ from studies import Store, Study, open_study, run_study
 
 DATA = Path(__file__).parents[1] / "data"
 COARSE = {
-    "element_size": 3.0, "advance_step": 3.0, "growth": 1.5, "track": 24.0,
+    "element_size": 3.0, "advance_step": 3.0, "growth": 1.5, "track": 18.0,
     # how the wheel is set down and lifted hardly matters at mid-track
     "press_steps": 6, "unload_steps": 1,
 }  # fmt: skip

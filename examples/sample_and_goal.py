@@ -9,7 +9,7 @@ import numpy as np
 from studies import Store, open_study, run_study
 
 COARSE = {
-    "accuracy": "draft", "smallest_element": 0.05, "growth": 2.5, "load_step": 0.25,
+    "accuracy": "draft", "smallest_element": 0.05, "growth": 3.0, "load_step": 0.25,
     "unload_steps": 1, "hardening": "isotropic",
 }  # fmt: skip
 
@@ -36,7 +36,7 @@ GOAL = {
     "scene": "punch",
     "parameters": COARSE,
     "sweep": {"friction": [0.2, 0.3]},
-    "goal": {"of": "peak_residual_tension", "at": 100.0, "between": [0.3, 1.2], "within": 0.02},
+    "goal": {"of": "peak_residual_tension", "at": 100.0, "between": [0.3, 1.2], "within": 0.05},
 }
 
 
@@ -58,7 +58,7 @@ def search() -> None:
     with open_study("sample", GOAL["name"]) as dataset:
         found = dataset.squeeze()
         print(found[["load_ratio", "load_ratio_low", "load_ratio_high", "runs"]].to_dataframe())
-        assert (found.load_ratio_high / found.load_ratio_low < 1.021).all()
+        assert (found.load_ratio_high / found.load_ratio_low < 1.053).all()
         assert (found.load_ratio.diff("friction") < 0.0).all(), "friction leaves more tension"
 
 

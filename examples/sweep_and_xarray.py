@@ -17,8 +17,8 @@ STUDY = Study.from_dict(
         "scene": "punch",
         "parameters": {
             "accuracy": "draft",
-            "smallest_element": 0.02,
-            "growth": 2.0,
+            "smallest_element": 0.05,
+            "growth": 3.0,
             "hardening": "isotropic",
         },
         "sweep": {"load_ratio": [0.5, 0.7, 0.9], "friction": [0.0, 0.3]},
