@@ -59,7 +59,7 @@ def test_two_of_one_name_are_told_with_what_differs(
 def test_of_long_entries_the_part_that_differs_is_told(
     store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
-    loads = [0.1 + 0.01 * k for k in range(40)]
+    loads = [0.1 + k / 30 for k in range(12)]
     for last in (0.7, 0.8):
         compute_here(fake_study("tour", {"load_ratio": [*loads, last]}), store)
     open_study(store.directory, "tour").close()
@@ -71,11 +71,11 @@ def test_an_entry_of_one_study_alone_is_shown_from_its_beginning(
     store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
     compute_here(fake_study("tour", {"load_ratio": [0.5]}), store)
-    frictions = [0.01 * k for k in range(40)]
+    frictions = [k / 30 for k in range(12)]
     compute_here(fake_study("tour", {"load_ratio": [0.5], "friction": frictions}), store)
     open_study(store.directory, "tour").close()
     (told,) = [text for text in caplog.messages if "of this name" in text]
-    assert "friction = [0.0, 0.01" in told
+    assert "friction = [0.0, 0.0333" in told
 
 
 def test_a_study_in_a_directory_is_named_in_its_path(store: Store) -> None:
