@@ -19,7 +19,7 @@ from studies import Client
 STUDY = {
     "name": "tour",
     "scene": "punch",
-    "parameters": {"smallest_element": 0.02, "growth": 2.0, "hardening": "isotropic"},
+    "parameters": {"accuracy": "draft", "smallest_element": 0.05, "hardening": "isotropic"},
     "sweep": {"load_ratio": [0.5714, 0.8571], "friction": [0.0, 0.3]},
 }
 
@@ -31,7 +31,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def wait_until_ready(url: str, seconds: float = 30.0) -> None:
+def wait_until_ready(url: str, seconds: float = 120.0) -> None:
     """Wait until the service reports that it is ready."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
