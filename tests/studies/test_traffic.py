@@ -54,6 +54,7 @@ def test_tables_of_a_file_are_those_of_a_request(tmp_path: Path) -> None:
     assert Study.from_toml(file).id == posted.id
 
 
+@pytest.mark.long
 @pytest.mark.solves
 def test_a_study_of_sequences_is_computed_and_read(store: Store) -> None:
     order = {"first": {"sequence": ENTRIES}, "last": {"sequence": ENTRIES[::-1]}}
