@@ -196,6 +196,7 @@ def test_runs_that_kill_their_worker_fail_and_the_next_study_succeeds(lively: Se
     assert lively.finished(next_id)["status"] == "successful"
 
 
+@pytest.mark.long
 def test_a_temporary_folder_that_a_kill_leaves_is_removed_at_the_next_start(
     mortal: Server, tmp_path: Path
 ) -> None:
