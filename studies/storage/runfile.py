@@ -41,7 +41,10 @@ def sealed(run: layout.RunContent) -> bytes:
 
 
 def packed(run: layout.RunContent) -> bytes:
-    """Return a run as netCDF, made in memory: HDF5 does not survive a full disk."""
+    """Return a run as netCDF, made in memory: HDF5 does not survive a full disk.
+
+    All variables come before the first value, with which the library writes what it knows of all.
+    """
     import netCDF4  # a complete study does not need it
 
     order = [str(name) for name, each in run.variables.items() if not ugrid.owns(name, each.dims)]
@@ -49,17 +52,18 @@ def packed(run: layout.RunContent) -> bytes:
         file = netCDF4.Dataset(run.attrs["id"], "w", memory=_FIRST_BYTES)
         try:
             file.setncatts({**run.attrs, **seal.SEALED, _ORDER: " ".join(order)})
-            for name, variable in run.variables.items():
-                _write(file, str(name), variable)
+            stored = [_declared(file, str(name), each) for name, each in run.variables.items()]
+            for into, each in zip(stored, run.variables.values(), strict=True):
+                values = np.asarray(each.values)
+                into[...] = values.astype(object) if values.dtype.kind in "OU" else values
         finally:
             content = file.close()
         return bytes(content)
 
 
-def _write(file: Any, name: str, variable: layout.Variable) -> None:
-    """Write a variable, and the dimensions that the file does not have yet."""
-    values = np.asarray(variable.values)
-    for dimension, length in zip(variable.dims, values.shape, strict=True):
+def _declared(file: Any, name: str, variable: layout.Variable) -> Any:
+    """Return a variable of a file without its values; dimensions that it lacks are added."""
+    for dimension, length in zip(variable.dims, np.shape(variable.values), strict=True):
         if dimension not in file.dimensions:
             file.createDimension(dimension, length)
     storage = layout.storage_of(variable)
@@ -68,7 +72,7 @@ def _write(file: Any, name: str, variable: layout.Variable) -> None:
     stored = file.createVariable(name, dimensions=variable.dims, **storage)
     stored.setncatts(variable.attrs)
     stored.set_auto_maskandscale(False)
-    stored[...] = values.astype(object) if values.dtype.kind in "OU" else values
+    return stored
 
 
 @contextmanager

@@ -63,17 +63,17 @@ def attribute(name: str, **changes: Any) -> Fault:
 
 def stored(name: str, **changes: Any) -> Fault:
     """A variable is stored in another way."""
-    write = runfile._write
+    declared = runfile._declared
 
-    def changed(file: Any, each: str, variable: layout.Variable) -> None:
+    def changed(file: Any, each: str, variable: layout.Variable) -> Any:
         usual = layout.storage_of
         with pytest.MonkeyPatch.context() as patch:
             if each == name:
                 patch.setattr(layout, "storage_of", lambda given: {**usual(given), **changes})
-            write(file, each, variable)
+            return declared(file, each, variable)
 
     def fault(patch: Patch) -> None:
-        patch.setattr(runfile, "_write", changed)
+        patch.setattr(runfile, "_declared", changed)
 
     return fault
 
