@@ -28,7 +28,7 @@ from solver.contact.state import Converged
 from solver.contact.system import System
 from solver.derivatives.asked import STEP, Derivatives, doubted
 from solver.derivatives.family import _slopes
-from solver.errors import NotConverged
+from solver.errors import NoContact, NotConverged
 from solver.loading.increment import Increment
 from solver.loading.step import newton_step
 from solver.loading.walker import Walker
@@ -602,6 +602,29 @@ def test_passes_with_derivatives_do_not_go_on_from_a_run_without() -> None:
     assert begun.scalars["axle_height"] == second.scalars["axle_height"]
     name = "d_axle_height_d_friction"
     assert begun.scalars[name] == whole.scalars[name] != 0
+
+
+def test_passes_that_are_found_with_smaller_elements_keep_their_derivatives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The first search fails, as of a contact that draft elements do not resolve."""
+    scene, given = SCENES["raceway"], {"load": "hertz", "load_ratio": 1.8, "friction": 0.1}
+    searches = iter([True])
+
+    def lost(*passed: Any, **how: Any) -> Any:
+        if next(searches, False):
+            raise NoContact("no contact forces were found")
+        return search(*passed, **how)
+
+    monkeypatch.setattr(rail_passes, "search", lost)
+    asked = ("yield_stress",), ("max_plastic_strain",)
+    record, plain = (
+        numbers(scene, scene.parameters(accuracy=accuracy, **given), *asked)
+        for accuracy in ("draft", "standard")
+    )
+    assert "computed with accuracy = standard instead" in record.message
+    name = "d_max_plastic_strain_d_yield_stress"
+    assert record.scalars[name] == plain.scalars[name] != 0
 
 
 def test_a_size_of_the_elements_of_a_track_is_refused() -> None:

@@ -139,7 +139,7 @@ def by_passes(
     for run in others:
         tally = replace(run.outcome.tally, seconds=spent + run.outcome.tally.seconds)
         outcome = replace(run.outcome, tally=tally)
-        yield replace(run, outcome=outcome, derived=path.derived([]))
+        yield replace(run, outcome=outcome, derived=run.derived or path.derived([]))
 
 
 class _Path:
