@@ -595,13 +595,14 @@ def test_passes_with_derivatives_do_not_go_on_from_a_run_without() -> None:
     scene = SCENES["wheel_rail"]
     parameters, of = scene.parameters(**RAIL, passes=2), ("axle_height",)
     first, second = scene.path(parameters, [1, 2], lambda share: None)
-    assert first.state
+    assert first.state()
     with_them = replace(scene, derivatives=Derivatives(by=("friction",), of=of))
-    (begun,) = with_them.path(parameters, [2], lambda share: None, begun=first.state)
+    (begun,) = with_them.path(parameters, [2], lambda share: None, begun=first.state())
     whole = numbers(scene, parameters, ("friction",), of)
     assert begun.scalars["axle_height"] == second.scalars["axle_height"]
     name = "d_axle_height_d_friction"
     assert begun.scalars[name] == whole.scalars[name] != 0
+    assert not whole.state(), "a longer run with derivatives begins anew, and estimates say so"
 
 
 def test_passes_that_are_found_with_smaller_elements_keep_their_derivatives(

@@ -253,7 +253,9 @@ class _Path:
             return passes.audit(found, before, number)
 
         def state() -> Mapping[str, Array]:
-            own = passes.state(found, self._traces) if found and self.error is None else {}
+            if found is None or self.error or self._family:  # neighbours have no state
+                return {}
+            own = passes.state(found, self._traces)
             kept = {"reach": [self._reach], "seconds": [seconds], "steps": self._steps}
             return own and {**own, **{k: np.array(v, dtype=float) for k, v in kept.items()}}
 
