@@ -605,6 +605,15 @@ def test_passes_with_derivatives_do_not_go_on_from_a_run_without() -> None:
     assert not whole.state(), "a longer run with derivatives begins anew, and estimates say so"
 
 
+def test_a_locked_wheel_has_no_derivative_by_traction() -> None:
+    """With a little less traction it turns: the height of its axle would fall by 0.001 mm."""
+    parameters = SCENES["wheel_rail"].parameters(**{**RAIL, "traction": 1.0, "friction": 0.2})
+    record = numbers(SCENES["wheel_rail"], parameters, ("traction", "friction"), ("axle_height",))
+    assert np.isnan(record.scalars["d_axle_height_d_traction"])
+    assert np.isfinite(record.scalars["d_axle_height_d_friction"])
+    assert "no derivative was found for d_axle_height_d_traction" in record.message
+
+
 def test_passes_that_are_found_with_smaller_elements_keep_their_derivatives(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -167,10 +167,13 @@ class RailPasses(Passes):
         self, beside: Pass[PrismState], last: Pass[PrismState] | None, number: int
     ) -> Pass[PrismState]:
         """See `Passes`."""
-        state = last.after if last else self._track.virgin(self.law)
+        state, load = last.after if last else self._track.virgin(self.law), self.load(number).exact
+        assert isinstance(beside.loading, AppliedPatch)
+        if (load.load.drive is None) != (beside.loading.load.load.drive is None):
+            raise NotConverged("the wheel is locked in one run, and turns in the other")
         with one_thread():
             return passing(
-                self._track, self.law, self.load(number).exact, state, beside.strain,
+                self._track, self.law, load, state, beside.strain,
                 start=beside.loading.start, parts=beside.parts, tolerance=EXACT_ON_RAIL,
             )  # fmt: skip
 
