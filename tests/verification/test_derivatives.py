@@ -38,6 +38,8 @@ from solver.results.record import Status
 from solver.rolling.passing import EXACT
 from solver.rolling.scenes import rail_passes
 from solver.rolling.scenes.rolling_endless import TrackPasses, load_on
+from solver.rolling.scenes.wheel_rail_setup import load_on as rail_load
+from solver.rolling.scenes.wheel_rail_setup import prism as rail_prism
 from solver.rolling.search import search
 from solver.scenes import Scene
 from solver.shipped import SCENES
@@ -603,6 +605,20 @@ def test_passes_with_derivatives_do_not_go_on_from_a_run_without() -> None:
     name = "d_axle_height_d_friction"
     assert begun.scalars[name] == whole.scalars[name] != 0
     assert not whole.state(), "a longer run with derivatives begins anew, and estimates say so"
+
+
+def test_a_longer_length_after_which_waves_repeat_is_another_mesh() -> None:
+    """Between near wheels the window has no room to grow with it."""
+    scene = SCENES["wheel_rail"]
+    lighter, heavier = (
+        scene.parameters(
+            accuracy="draft", wheel_distance=20.0, lateral_position=-6.0, load=load,
+        )
+        for load in (250e3, 252e3)
+    )  # fmt: skip
+    passes = rail_passes.RailPasses(rail_prism, rail_load, lighter, scene.view(lighter), 1.0)
+    assert passes.same_mesh(replace(lighter, load=249.9e3))
+    assert not passes.same_mesh(heavier)
 
 
 def test_a_locked_wheel_has_no_derivative_by_traction() -> None:

@@ -180,7 +180,9 @@ class RailPasses(Passes):
     def same_mesh(self, parameters: Any) -> bool:
         """See `Passes`. Nodes may move, but not become more or fewer."""
         one, other = self._track, self._prism(parameters, self._reach)
-        counts = [(track.weights.shape, track.grid.stations) for track in (one, other)]
+        counts = [
+            (each.weights.shape, each.grid.stations, each.modes.stations) for each in (one, other)
+        ]
         return counts[0] == counts[1] and np.array_equal(one.section.dofs, other.section.dofs)
 
     def shown(self, number: int) -> tuple[Samples, Callable[[Any], Acting]]:
