@@ -220,6 +220,16 @@ def test_wheels_stand_on_whole_numbers_of_stations_and_share_the_rail(distance: 
     assert own.waves >= alone.waves and alone.spacing == 2.0
 
 
+def test_a_contact_longer_than_the_distance_of_wheels_asks_for_a_larger_one() -> None:
+    long = WheelRailParameters(
+        accuracy="draft", foundation=1e4, lateral_position=-6.0, wheel_radius=5000.0,
+        wheel_distance=20.0,
+    )  # fmt: skip
+    (record,) = SCENE.path(long, [1], lambda share: None)
+    assert record.status is Status.NOT_CONVERGED
+    assert record.message.endswith("; lower the load, or enlarge wheel_distance")
+
+
 def test_the_effort_is_that_of_the_run() -> None:
     _, third = rolled(passes=(1, 3))
     assert SCENE.effort is not None

@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from solver.errors import WindowTooSmall
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
 from solver.results.view import ACROSS_TRACK, View
@@ -145,4 +146,8 @@ def effort(parameters: WheelRailParameters, passes: Sequence[float]) -> Effort:
 def advice(parameters: WheelRailParameters) -> Advice:
     """Return what the user can do."""
     contact = expected_contact(parameters)
-    return remedies(parameters, 1.5 * parameters.load / (np.pi * contact.widest * contact.along))
+    pressure = 1.5 * parameters.load / (np.pi * contact.widest * contact.along)
+    found = remedies(parameters, pressure)
+    if parameters.wheel_distance == "alone":
+        return found
+    return {**found, WindowTooSmall: "lower the load, or enlarge wheel_distance"}
