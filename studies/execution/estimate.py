@@ -11,8 +11,8 @@ import contextlib
 import itertools
 import math
 import os
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,8 @@ _FIELDS = 100
 """Bytes per unknown that kept fields add to a run's file, if none is known: 55 to 185."""
 _TOLD = 2.0
 """Factor of the low and high estimates where the scene tells the seconds."""
+_NEIGHBOUR = 0.75
+"""Memory of the set-up of a neighbouring run over the memory of its path: .4 to .7 on a rail."""
 _BATCH = 500
 
 
@@ -210,7 +212,7 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
         elements, set_up = 0, 0.0
         if scene.effort is not None:
             try:
-                effort = _effort(scene.effort, path, missing, own)
+                effort = _effort(scene, path, missing, own)
             except ModelError as error:
                 refused.append(study.expansion.located(error, path.cases[0].index))
                 results += len(missing) * _of(_PER_RUN, 0)
@@ -261,15 +263,30 @@ def estimate(study: Study, store: Store, bounds: Bounds | None = None) -> Estima
     return found
 
 
-def _effort(
-    of: Callable[[Any, Sequence[Any]], Effort],
-    path: LoadingPath,
-    values: list[Any],
-    begun: list[int],
-) -> Effort:
-    """Return the work of a path, without that of the stored run that it goes on from."""
-    own = of(path.parameters, values)
-    return own.without(of(path.parameters, begun)) if begun else own
+def _effort(scene: Scene, path: LoadingPath, values: list[Any], begun: Sequence[int]) -> Effort:
+    """Return the work of a path, without that of the stored run that it goes on from.
+
+    Neighbouring runs of its derivatives may have set-ups of their own.
+    """
+    assert scene.effort is not None
+    own = scene.effort(path.parameters, values)
+    further = _set_ups(scene, path.parameters) - 1
+    if further > 0:
+        memory = round(own.memory * (1 + _NEIGHBOUR * further))
+        own = replace(own, set_up=own.set_up * (1 + further), memory=memory)
+    return own.without(scene.effort(path.parameters, begun)) if begun else own
+
+
+def _set_ups(scene: Scene, parameters: Any) -> int:
+    """Return the number of different set-ups of a run of passes and its neighbours."""
+    asked, setup = scene.derivatives, scene.setup
+    if not (asked and setup and scene.derives):
+        return 1
+    each = {setup(parameters)}
+    for name, step in asked.steps(parameters, asked.by).items():
+        with contextlib.suppress(ModelError):  # then the other side is taken
+            each.add(setup(replace(parameters, **{name: getattr(parameters, name) + step})))
+    return len(each)
 
 
 def _begun(path: LoadingPath, missing: Sequence[Any], store: Store) -> list[int]:
@@ -296,7 +313,7 @@ def memory_needed(study: Study) -> int:
     every = _longest(study) if study.kind.chooses else paths
     for path, values in itertools.islice(every, _BATCH):
         with contextlib.suppress(ModelError):  # its runs will end at once
-            most = max(most, _of_a_worker(scene.effort(path.parameters, values), kept))
+            most = max(most, _of_a_worker(_effort(scene, path, values, ()), kept))
     return most
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from solver import SCENES
 from studies import Store, Study, StudyError, fit, open_study
-from studies.execution.estimate import estimate
+from studies.execution.estimate import Estimate, estimate
 from studies.scenes.description import Description
 from studies.scenes.entries import derived
 from studies.scenes.scene import file_scene, read_scene
@@ -143,6 +143,20 @@ def test_an_estimate_counts_them(store: Store) -> None:
         for more in ({"derivatives": {"by": ["friction"], "of": ["plastic_work"]}}, {})
     ]
     assert both[0] and both[1] and both[0][1] > 1.2 * both[1][1]
+
+
+def test_an_estimate_counts_the_set_ups_of_neighbours(store: Store) -> None:
+    """A rail by friction has one; by foundation and Young's modulus it has three."""
+
+    def estimated(*by: str) -> Estimate:
+        asked = {"by": list(by), "of": ["axle_height"]}
+        given = {"name": "rail", "scene": "wheel_rail", "derivatives": asked}
+        return estimate(Study.from_dict({**given, "parameters": {"friction": 0.3}}), store)
+
+    one, three = estimated("friction"), estimated("friction", "foundation", "youngs_modulus")
+    assert one.memory and three.memory and one.most_cpu_seconds and three.most_cpu_seconds
+    assert 1.0e9 < three.memory - one.memory < 1.4e9, "measured: 1.14e9"
+    assert three.most_cpu_seconds > 1.5 * one.most_cpu_seconds
 
 
 BAR = """
