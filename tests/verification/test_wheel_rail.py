@@ -211,7 +211,7 @@ def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize("distance", [29.0, 30.0, 120.0])
 def test_wheels_stand_on_whole_numbers_of_stations_and_share_the_rail(distance: float) -> None:
-    own = geometry(WheelRailParameters(wheel_distance=distance, accuracy="draft"))
+    own = geometry(WheelRailParameters(wheel_distance=distance, foundation=1e3, accuracy="draft"))
     between = distance / own.spacing
     assert between == pytest.approx(round(between)) and 0.9 * 2.0 <= own.spacing <= 2.0
     assert 2 * own.waves % round(between) == 0
@@ -314,6 +314,11 @@ def test_a_wheel_beside_the_rail_is_refused_by_name() -> None:
         ({"initial_stress": "over_height"}, r"stress_over_height = \(\): must be given"),
         ({"load": 0.0}, r"load = 0\.0: must be greater than 0"),
         ({"span": 2400.0, "wheel_distance": 60.0}, r"wheel_distance = 60\.0: needs span = endless"),
+        (
+            {"wheel_distance": 120.0},
+            r"foundation = 21\.0: must be at least 125 MPa under a wheel of 150000 N every 120 mm: "
+            r"the rail would sink by 59\.5 mm",
+        ),
     ],
 )
 def test_parameters_that_do_not_fit_are_refused(given: dict[str, Any], told: str) -> None:

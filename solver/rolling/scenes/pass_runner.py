@@ -22,6 +22,7 @@ from solver.results.fields import Samples
 from solver.results.mesh_fields import MeshFields
 from solver.results.run import FinishedRun, Values
 from solver.results.view import View
+from solver.rolling.load import PassingLoad
 from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.results.stage import SteadyBody
 from solver.scenes.scene import Monitor, Scene
@@ -53,6 +54,10 @@ class Passes(ABC):
     @abstractmethod
     def found(self, budget: SolveBudget) -> Iterator[Pass[Any]]:
         """Yield the passes behind those of `begin`; ``budget`` counts the solves of each."""
+
+    @abstractmethod
+    def load(self, number: int) -> PassingLoad:
+        """Return the load of a pass, counted from 0."""
 
     @abstractmethod
     def follow(self, beside: Pass[Any], last: Pass[Any] | None, number: int) -> Pass[Any]:
@@ -194,12 +199,15 @@ class _Path:
         self._found = found
         self._steps.append(max(found.steps, 1))
         self._traces.append(self._passes.trace(found))
-        last = found
+        last, number = found, len(self._steps) - 1
         for other in self._beside:  # each begins where the one before it has ended
             if other.error or self._beside[0].error:
                 continue
             try:
-                last = other._passes.follow(last, other._found, len(self._steps) - 1)
+                drives = [each._passes.load(number).load.drive for each in (self, other)]
+                if (drives[0] is None) != (drives[1] is None):
+                    raise NotConverged("the wheel is locked in one run, and turns in the other")
+                last = other._passes.follow(last, other._found, number)
                 other._take(last)
             except NotConverged as failure:
                 other.error = failure

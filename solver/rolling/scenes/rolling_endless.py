@@ -225,9 +225,13 @@ class TrackPasses(Passes):
         p = self.parameters
         return [load_on(self._track, p, own) for own in p.block]
 
+    def load(self, number: int) -> PassingLoad:
+        """See `Passes`."""
+        return self._loads[number % len(self._loads)]
+
     def follow(self, beside: Pass[Layers], last: Pass[Layers] | None, number: int) -> Pass[Layers]:
         """See `Passes`."""
-        way, load = self._ways[number], self._loads[number % len(self._loads)]
+        way, load = self._ways[number], self.load(number)
         state = last.left if last else self._track.rows.virgin(self.law)
         with one_thread():
             found = passing(

@@ -36,6 +36,8 @@ _HEAD, _WIDEST, _LOWEST, _HIGHEST = 28.0, 38.0, -30.0, 5.0
 points; lowest and highest position of the surface [mm]."""
 _CLOSEST = 1.0
 """Least distance of stations along the rail [mm]."""
+_SINKS = 10.0
+"""Largest displacement of a rail under equal wheels [mm]: the wheels touch it where it was."""
 Points = tuple[tuple[float, float], ...]
 """Points z, y of a profile, z increasing [mm]."""
 _OF_A_PASS = (
@@ -172,12 +174,26 @@ class WheelRailParameters(PrismParameters):
         self._check_head()
         _ = self.rail_stress  # raises an error for parameters that do not fit together
         self._check_lateral()
-        if self.wheel_distance != "alone" and self.span != "endless":
-            raise ModelError("wheel_distance", self.wheel_distance, "needs span = endless")
+        self._check_distance()
         if self.scattered:
             check_spreads(self, _SPREADS)
         if self.sequence:
             _ = self.block  # raises an error for a wrong entry
+
+    def _check_distance(self) -> None:
+        """Raise `ModelError` where equal wheels at a distance cannot be, or sink far."""
+        apart = self.wheel_distance
+        if apart == "alone":
+            return
+        if self.span != "endless":
+            raise ModelError("wheel_distance", apart, "needs span = endless")
+        if (sinks := self.load / (float(apart) * self.foundation)) > _SINKS:
+            least = self.foundation * sinks / _SINKS
+            allowed = (
+                f"must be at least {least:.3g} MPa under a wheel of {self.load:g} N every "
+                f"{float(apart):g} mm: the rail would sink by {sinks:.3g} mm"
+            )
+            raise ModelError("foundation", self.foundation, allowed)
 
     @property
     def rail_stress(self) -> SectionStress:
