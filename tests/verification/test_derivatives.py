@@ -550,7 +550,7 @@ RAIL = {"accuracy": "draft", "traction": 0.3, "friction": 0.3}
 CHABOCHE = {"hardening": "chaboche", "back_stresses": ((4e4, 300.0), (5e3, 0.0))}
 IN_SPACE: dict[str, tuple[str, dict[str, Any], tuple[str, ...]]] = {
     "rail": ("wheel_rail", {**RAIL, "passes": 2, "lateral_position": -4.0}, ("lateral_position",)),
-    "recall": ("wheel_rail", {**RAIL, **CHABOCHE}, ("yield_stress", "load")),
+    "recall": ("wheel_rail", {**RAIL, **CHABOCHE}, ("yield_stress",)),
     # the nodes move with the size of the ellipse
     "raceway": (
         "raceway", {**RAIL, "friction": 0.1, "load_ratio": 1.8, "passes": 2},
