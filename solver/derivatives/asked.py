@@ -23,8 +23,8 @@ _WIDER = 10.0
 since gaps of a contact are small differences of their positions, and of passes over a prism."""
 
 _SHARE = 0.3
-"""Time of a neighbouring run over that of the run: .15 on a punch of standard and .3 of draft
-accuracy, .7 on a ball, whose surface turns."""
+"""Time of a neighbouring run over that of the run: .15 to .3 on a punch, and .7 on a ball, where
+surfaces slide far."""
 
 
 _AT_A_SWITCH = 1e-5
