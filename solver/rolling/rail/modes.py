@@ -122,7 +122,7 @@ class Modes:
         """The same waves, in single precision."""
         other, kind = copy(self), np.dtype(np.float32)
         other.precision = kind
-        for name in ("B0", "B1", "_force0", "_force1", "rows", "_twice_k", "_loads"):
+        for name in ("B0", "B1", "_force0", "_force1", "rows", "_twice_k"):
             setattr(other, name, getattr(self, name).astype(kind))
         other.columns = self.columns  # few of them are read at a time
         for name in ("_into", "_into_behind", "_back"):
@@ -152,13 +152,14 @@ class Modes:
         # f = sum over c of f_c e^(-i phase); divided by i for what carries i
         plain = np.stack([cos, -sin], axis=-1).reshape(n, -1)
         carrying = np.stack([-sin, -cos], axis=-1).reshape(n, -1)
-        self._into = plain[:window], carrying[:window]
+        loads = np.repeat(self._loads, 2)
+        self._into = plain[:window] * loads, carrying[:window] * loads
         twice = np.full(n // 2 + 1, 2.0)
         twice[[0, -1]] = 1.0
         self._share = twice / n
         share = np.repeat(self._share, 2)
         self._back = (share * plain[:window]).T.copy(), (share * carrying[:window]).T.copy()
-        self._into_behind = self._into
+        self._into_behind = plain[:window], carrying[:window]
         if len(behind):
             self._into_behind = plain[:window].copy(), carrying[:window].copy()
             self._into_behind[0][-1] += behind @ plain[window:]
@@ -298,8 +299,7 @@ class Modes:
     def _of_rows(self, forces: Array) -> Array:
         """Return the amplitudes (n_rows, 2 waves) of forces (n_rows, window)."""
         plain, carrying = self._into
-        each = np.where(self.along[:, None], forces @ carrying, forces @ plain)
-        return np.asarray(each * np.repeat(self._loads, 2))
+        return np.where(self.along[:, None], forces @ carrying, forces @ plain)
 
     def _rows_at_stations(self, amplitudes: Array) -> Array:
         """Return the displacements (n_rows, window) of amplitudes (n_rows, 2 waves)."""

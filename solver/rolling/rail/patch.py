@@ -51,7 +51,7 @@ _PRESSED = 0.5
 """Interpenetration of the undeformed bodies at the edge of the contact, over their approach. For a
 ball in contact over a radius a it is 0.5 at the edge (K.L. Johnson, 1985, section 4.2)."""
 _EXACT = 1e-12
-"""Tolerance of `solve_cone`, of contacts of which differences of 1e-6 are taken."""
+"""Tolerance of `solve_cone`, of contacts of which differences of 1e-5 are taken."""
 UPSTREAM = (1.5, -2.0, 0.5)
 """Weights of the displacement at a station, at the one before and at the second before, in the
 slip."""

@@ -20,7 +20,7 @@ from solver.results.run import FinishedRun
 from solver.results.view import View
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
-from solver.rolling.passing import Pass, SolveBudget, passing
+from solver.rolling.passing import Pass, SolveBudget, followed
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.track import PrismTrack
@@ -39,7 +39,7 @@ _TRIED = {"draft": "standard"}
 """The accuracy that is tried where another one is lost; finer ones than these need too much memory
 to be tried unasked."""
 EXACT_ON_RAIL = 1e-10
-"""Tolerance of passes of which differences of 1e-6 are taken; rounding of waves leaves 3e-11."""
+"""Tolerance of passes of which differences of 1e-5 are taken; rounding of waves leaves 3e-11."""
 _SETTLED = 1
 """Largest number of Newton steps of a pass after which the next pass begins with its strain."""
 
@@ -167,12 +167,8 @@ class RailPasses(Passes):
         self, beside: Pass[PrismState], last: Pass[PrismState] | None, number: int
     ) -> Pass[PrismState]:
         """See `Passes`."""
-        state = last.after if last else self._track.virgin(self.law)
-        with one_thread():
-            return passing(
-                self._track, self.law, self.load(number).exact, state, beside.strain,
-                start=beside.loading.start, parts=beside.parts, tolerance=EXACT_ON_RAIL,
-            )  # fmt: skip
+        before = last.after if last else self._track.virgin(self.law)
+        return followed(self._track, self.law, self.load(number), before, beside, EXACT_ON_RAIL)
 
     def same_mesh(self, parameters: Any) -> bool:
         """See `Passes`. Nodes may move, but not become more or fewer."""

@@ -27,7 +27,7 @@ from solver.results.shakedown import ShakedownState
 from solver.results.view import View
 from solver.rolling.audit.plane import audit_pass
 from solver.rolling.load import FULL_SLIP, PassingLoad, RollingLoad
-from solver.rolling.passing import EXACT, Pass, SolveBudget, passing
+from solver.rolling.passing import Pass, SolveBudget, followed
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.lines import rim_elements, track_lines, wheel_nodes
 from solver.rolling.plane.rolling import rolling
@@ -231,13 +231,9 @@ class TrackPasses(Passes):
 
     def follow(self, beside: Pass[Layers], last: Pass[Layers] | None, number: int) -> Pass[Layers]:
         """See `Passes`."""
-        way, load = self._ways[number], self.load(number)
-        state = last.left if last else self._track.rows.virgin(self.law)
-        with one_thread():
-            found = passing(
-                self._track, self.law, load.exact, state if way == 1 else state.mirrored,
-                beside.strain, start=beside.loading.start, parts=beside.parts, tolerance=EXACT,
-            )  # fmt: skip
+        way, before = self._ways[number], last.left if last else self._track.rows.virgin(self.law)
+        before = before if way == 1 else before.mirrored
+        found = followed(self._track, self.law, self.load(number), before, beside)
         return replace(found, direction=way)
 
     def same_mesh(self, parameters: RollingParameters) -> bool:
