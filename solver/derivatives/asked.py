@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ STEP = -1e-6
 """Difference of a parameter of a neighbouring run over its value. It is negative: a load slightly
 above a whole number of increments would need one more."""
 
-_WIDER = 10.0
+WIDER = 10.0
 """The same where more is known up to rounding only, over `STEP`: of a parameter that moves nodes,
 since gaps of a contact are small differences of their positions, and of passes over a prism."""
 
@@ -117,10 +117,10 @@ class Derivatives:
         notes += at_switches({by: there[reach(by)] for by in self.by if reach(by) in there})
         return notes + doubted({q.name: value for q, value in values.items()})
 
-    def steps(self, parameters: Any, wider: Collection[str]) -> dict[str, float]:
+    def steps(self, parameters: Any, wider: Mapping[str, float]) -> dict[str, float]:
         """Return the difference of each parameter that is not zero.
 
-        It is ten times wider for some of them, see `_WIDER`.
+        It is wider for some of them, by the factors ``wider``.
         """
         found = {}
         for name in self.by:
@@ -129,7 +129,7 @@ class Derivatives:
                 raise ModelError(name, value, "must be a number: it is derived by")
             if value == 0:
                 continue
-            found[name] = value * STEP * (_WIDER if name in wider else 1.0)
+            found[name] = value * STEP * wider.get(name, 1.0)
             try:
                 replace(parameters, **{name: value + found[name]})
             except ModelError:  # at the lower end of its range

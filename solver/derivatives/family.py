@@ -9,10 +9,11 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+from skfem import Mesh
 
 from solver.contact.state import Converged
 from solver.contact.system import System
-from solver.derivatives.asked import AUDITED, Derivatives, named, reach
+from solver.derivatives.asked import AUDITED, WIDER, Derivatives, named, reach
 from solver.derivatives.neighbours import NeighbouringRuns
 from solver.errors import ModelError
 from solver.loading.outcome import IncrementFailed
@@ -27,6 +28,10 @@ _JUMP = 1e-3
 """Change of a number over the number, above which it jumps, as the place of a maximum that two
 places share does. It has no derivative. Changes of a line or a map are relative to its largest
 value."""
+
+_FINE, _WIDEST = 1e5, 30.0
+"""Extent of a mesh over its shortest edge above which differences are wider, and by which factor:
+rounding of displacements causes forces of about 1e-15 times this extent."""
 
 
 class Family:
@@ -46,7 +51,7 @@ class Family:
     """
 
     def __init__(self, asked: Derivatives, scene: Any, run: Any, wider: Iterable[str] = ()) -> None:
-        self._asked, self._scene, self._wider = asked, scene, set(wider)
+        self._asked, self._scene, self._wider = asked, scene, dict.fromkeys(wider, WIDER)
         self._ways = dict[str, int]()
         self._declared = asked.quantities(type(run), scene.known_quantities)
 
@@ -149,11 +154,13 @@ class IncrementalFamily(Family):
         self, asked: Derivatives, scene: Any, run: Any, system: System, samples: Samples
     ) -> None:
         super().__init__(asked, scene, run)
+        if any(_fineness(body.mesh) > _FINE for body in system.model.bodies):
+            self._wider = dict.fromkeys(asked.by, _WIDEST)
         models = dict(zip(self.steps(run), map(scene.model, self.runs(run)), strict=True))
         for name, model in models.items():
             both = zip(system.model.bodies, model.bodies, strict=True)
             if not all(np.array_equal(one.mesh.p, two.mesh.p) for one, two in both):
-                self._wider.add(name)
+                self._wider.setdefault(name, WIDER)
         self._parameters = [run, *self.runs(run)]
         for name, parameters in zip(models, self._parameters[1:], strict=True):
             if name in self._wider:  # its difference is wider
@@ -271,6 +278,12 @@ def _slopes(first: Mapping[str, Any], after: Mapping[str, Any], step: float) -> 
         most = _JUMP * _largest(value)
         found[of] = np.where(np.abs(change) > most, np.nan, change / step)
     return found
+
+
+def _fineness(mesh: Mesh) -> float:
+    """Return the extent of a mesh over its shortest edge."""
+    start, end = np.moveaxis(mesh.p[:, mesh.facets], 1, 0)
+    return float(np.ptp(mesh.p, axis=1).max() / np.linalg.norm(end - start, axis=0).min())
 
 
 def _largest(values: Any) -> float:

@@ -46,12 +46,13 @@ from solver.loading.energy import worked
 from solver.loading.increment import Increment
 from solver.loading.outcome import IncrementFailed
 from solver.loading.program import Control, Tolerances
+from solver.loading.step import rounding
 from solver.loading.stepper import Stepper, Way, placed
 from solver.tensors import principal
 from solver.typing import Array, Ints
 
-_TIGHT = Tolerances(residual=1e-12, contact=1e-12)
-"""Of an increment of which differences of 1e-6 are taken."""
+_TIGHT = 1e-12
+"""Tolerance of an increment of which differences of 1e-6 are taken, where rounding is smaller."""
 _NOISE = 1e-10
 """Change of a number in a neighbouring run, over its scale: a smaller one may be rounding."""
 
@@ -149,14 +150,16 @@ class NeighbouringRuns:
         IncrementFailed
             if it does not converge to the tolerance that a difference needs
         """
+        system, end = self._steppers[number].system, run.state
+        limit = max(_TIGHT, rounding(system, end.u) / (end.force_scale or np.inf))
         found = Increment(
-            self._steppers[number].system,
+            system,
             own.start,
             own.state.time,
-            guess=run.state,
+            guess=end,
             contact=not own.separated,
             elastic_first=False,
-            tolerances=_TIGHT,
+            tolerances=Tolerances(residual=limit, contact=limit),
         ).solve()
         return replace(found, energy=own.energy, near=own.near)
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.derivatives.asked import WIDER
 from solver.errors import ModelError
 from solver.memory import most_kept
 from solver.scenes import Effort, Scene
@@ -283,7 +284,7 @@ def _set_ups(scene: Scene, parameters: Any) -> int:
     if not (asked and setup and scene.derives):
         return 1
     each = {setup(parameters)}
-    for name, step in asked.steps(parameters, asked.by).items():
+    for name, step in asked.steps(parameters, dict.fromkeys(asked.by, WIDER)).items():
         with contextlib.suppress(ModelError):  # then the other side is taken
             each.add(setup(replace(parameters, **{name: getattr(parameters, name) + step})))
     return len(each)
