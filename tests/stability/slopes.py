@@ -80,7 +80,7 @@ def punch(rng: np.random.Generator) -> Drawn:
     if hardening in ("none", "isotropic") and given["state"] != "plane_stress":
         given["yield_condition"] = str(rng.choice(["mises", "tresca", *OWN[3:]]))
     elif rng.integers(3) == 0 and given["state"] != "plane_stress":
-        given["strain"] = "large"
+        given |= {"strain": "large", "element": "quad4"}
     made = SCENES["punch"].parameters(accuracy="draft", smallest_element=0.05, growth=2.0, **given)
     by = ["friction", "yield_stress", "load_ratio", "youngs_modulus", "half_width", "punch_height"]
     by += [name for name in ("shear_limit", "tau_max") if name in given]
