@@ -84,15 +84,15 @@ def _return_along(
         return accumulated
     double_shear, kappa, Hi, modulus, _ = law
     mean = (strain[0] + strain[1] + strain[2]) / 3.0
-    trial = np.empty(n)
     along = 0.0
     for k in range(n):
-        trial[k] = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
-        along += step[k] * trial[k]
+        trial = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
+        along += step[k] * trial
     grows = (along - SQRT23 * Hi * accumulated) / modulus
     turn = gamma / step[n + 1]
-    for k in range(n):
-        plastic[k] += grows * step[k] + turn * (trial[k] - along * step[k])
+    for k in range(n):  # the trial stress again: an array would be allocated in every call
+        trial = double_shear * (strain[k] - (mean if k < 3 else 0.0)) - kappa * plastic[k]
+        plastic[k] += grows * step[k] + turn * (trial - along * step[k])
     return accumulated + SQRT23 * grows
 
 
@@ -165,7 +165,8 @@ def flow_along(strain: Array, law: Array, steps: Array, each: _Each) -> tuple[Ar
         now[:] = 0.0
         a = 0.0
         for column in range(n_columns):
-            for part in range(parts):
+            yields = steps[row, column, 0, n + 1] != 0.0  # else `flow` has left all of them zero
+            for part in range(parts if yields else 0):
                 if steps[row, column, part, n] == 0.0:
                     continue
                 share = (part + 1.0) / parts
