@@ -162,7 +162,7 @@ def _critical(given: Array, used: Bools, search: Value, value: Value) -> tuple[A
     first, second = axes[:, i].swapaxes(1, 2), axes[:, j].swapaxes(1, 2)  # (n, axis, component)
     turn = first[:, i] * second[:, j] + np.where(i == j, 0.0, 1.0) * second[:, i] * first[:, j]
     paths = np.ascontiguousarray(turn[:, None] @ given)
-    cycle = _Search(paths, np.flatnonzero(used), search)
+    cycle = _Ascent(paths, np.flatnonzero(used), search)
     points, normal, falls, most = _starts(cycle)
     found = cycle.climbed(points, normal, -np.inf, falls)
     found = found.with_(cycle.climbed(*cycle.crossed(found), cycle.highest(found)))
@@ -220,7 +220,7 @@ class _Planes(NamedTuple):
         return _Planes(*(cast("Any", np.concatenate(pair)) for pair in pairs))
 
 
-class _Search(NamedTuple):
+class _Ascent(NamedTuple):
     """Paths (n_points, n_kinds, 6, n_instants), the values that the criterion reads, and it."""
 
     paths: Array
@@ -324,7 +324,7 @@ class _Search(NamedTuple):
         return more.at(more.best > least[k])
 
 
-def _starts(cycle: _Search) -> tuple[Ints, Array, Array, Array]:
+def _starts(cycle: _Ascent) -> tuple[Ints, Array, Array, Array]:
     """Return the planes from which maxima are climbed: points (n,) and normals (n, 3).
 
     And by how much these may be lower than the highest of a point (n_points,), and the most that
@@ -359,7 +359,7 @@ def _starts(cycle: _Search) -> tuple[Ints, Array, Array, Array]:
     return np.ascontiguousarray(points), normal, least.max(axis=1) - floor, most
 
 
-def _check(cycle: _Search, values: Array, *found: Array) -> None:
+def _check(cycle: _Ascent, values: Array, *found: Array) -> None:
     """Refuse a criterion that is not finite, or falls where what acts on planes rises."""
     search = cycle.search
     name = getattr(search, "__qualname__", type(search).__name__)

@@ -36,7 +36,7 @@ from solver.fatigue.planes import (
     _NORMALS,
     OnPlanes,
     Value,
-    _Search,
+    _Ascent,
     _hemisphere,
     critical_planes,
 )
@@ -63,13 +63,13 @@ def elastic(stress: Array) -> Paths:
     return Paths(stress, strain)
 
 
-def searching(paths: Paths, search: Value, read: Sequence[int] = range(6)) -> _Search:
+def searching(paths: Paths, search: Value, read: Sequence[int] = range(6)) -> _Ascent:
     """Return what a search knows of paths; it reads some of the values of `OnPlanes`."""
     x = np.ascontiguousarray(np.stack(paths.known, axis=1).swapaxes(2, 3))
-    return _Search(x, np.array(read), search)
+    return _Ascent(x, np.array(read), search)
 
 
-def acting(cycle: _Search, normal: Array) -> OnPlanes:
+def acting(cycle: _Ascent, normal: Array) -> OnPlanes:
     """Return what acts on a plane (3,), or on one (n, 3) of each point."""
     every = np.arange(len(cycle.paths))
     normals = np.array(np.broadcast_to(normal, (len(every), 3)), order="C")
