@@ -27,8 +27,8 @@ from solver.results.fields import Passed, StressCycle
 from solver.results.quantities import along_axes, declare, declare_along, placed
 from solver.results.run import FinishedRun, Values
 from solver.results.shakedown import CLOSED, QUIET
-from solver.results.surface_crack import SurfaceCrack
-from solver.results.view import Places
+from solver.results.surface_crack import LEAST, SurfaceCrack
+from solver.results.view import Places, View
 from solver.tensors import AXES, to_tensor
 from solver.typing import Array, Bools
 
@@ -68,6 +68,7 @@ PATH = tuple(
 )  # fmt: skip
 """Dang Van's diagram: a path and its limit."""
 APPLIES = declare("fatigue_applies", "whether the fatigue criterion applies", flags=Applies)
+CRACK_APPLIES = declare("crack_applies", "whether K of the initial crack is known", flags=Applies)
 
 
 _SAME = 1e-9
@@ -127,12 +128,24 @@ class Fatigue:
             raise ModelError(f"limits.{error.field}", error.value, error.allowed) from None
         return cls(criterion=made, crack=held, **more)
 
+    def fits(self, view: View) -> None:
+        """Refuse what runs with a view cannot have: see `SurfaceCrack.fits`."""
+        if self.crack is not None:
+            self.crack.fits(view)
+
+    def before(self, _parameters: Any, system: Any, view: View) -> None:
+        """Refuse what a run cannot have, before its first increment: see `SurfaceCrack.sampler`."""
+        if self.crack is not None:
+            self.crack.sampler(system, view)
+
     def __call__(self, run: FinishedRun, lines: Mapping[str, Places] | None = None) -> Values:
         """Return the quantities of a run."""
         values: dict[Any, Any] = {}
         if self.crack is not None:
             cycle = self._cycle(run, run.view.profile_body)
             values |= self.crack.values(run, cycle, _strained(cycle)[1])
+            values[CRACK_APPLIES] = Applies(int(np.isfinite(values[LEAST])))
+            values[STRAIN] = float(np.nanmax(cycle.grown, initial=0.0))
         if self.criterion is None:
             return values
         names = self.bodies or run.system.names

@@ -5,6 +5,9 @@ function of a run, or a frozen dataclass that is called with a run: its fields a
 field ``body`` is the name of a body. Such a class may have ``watch(system, converged)``, which
 returns numbers of every increment (quantities over the dimension ``increment``), and
 ``warnings(run)``, which returns texts for the user.
+
+An output of a scene may refuse (`ModelError`) what runs cannot have: ``fits(view)`` when a study is
+read, and ``before(parameters, system, view)`` before the first increment of a run.
 """
 
 from __future__ import annotations

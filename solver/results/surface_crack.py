@@ -7,6 +7,7 @@ the cycle strains plastically, K of a crack that reaches there is NaN.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -16,6 +17,7 @@ from solver.fatigue.cracks import arrest, opened_range, stress_intensity
 from solver.results.fields import StressCycle
 from solver.results.quantities import declare
 from solver.results.run import FinishedRun, Values
+from solver.results.view import View
 from solver.typing import Bools
 
 _UNIT = "MPa mm^0.5"
@@ -46,23 +48,39 @@ class SurfaceCrack:
     at: float | None = None
     across: bool = False
 
-    def values(self, run: FinishedRun, cycle: StressCycle, void: Bools) -> Values:
-        """Return the quantities of a run; ``void`` are cycles (n,) for which K does not hold.
+    def fits(self, view: View) -> None:
+        """Refuse profiles that end above the crack.
+
+        Raises
+        ------
+        ModelError
+            if it begins beyond the profiles
+        """
+        if self.initial >= view.depth[-1]:
+            allowed = f"must be less than the depth of profiles, {view.depth[-1]:g} mm"
+            raise ModelError("fatigue.crack.initial", self.initial, allowed)
+
+    def sampler(self, system: Any, view: View) -> Any:
+        """Return the sampler of the depths of the profiles below the crack.
 
         Raises
         ------
         ModelError
             if it begins beyond the profiles or outside the body
         """
-        view, body = run.view, run.view.profile_body
-        if self.initial >= view.depth[-1]:
-            allowed = f"must be less than the depth of profiles, {view.depth[-1]:g} mm"
-            raise ModelError("fatigue.crack.initial", self.initial, allowed)
+        self.fits(view)
         at = view.station[len(view.station) // 2] if self.at is None else self.at
         at = abs(at) if view.symmetric else at
-        sampler = run.system.sampler(body, replace(view, station=np.array([at])).profiles)
-        if self.at is not None and not sampler.inside[0]:
-            raise ModelError("fatigue.crack.at", self.at, f"must be on the surface of {body}")
+        found = system.sampler(view.profile_body, replace(view, station=np.array([at])).profiles)
+        if self.at is not None and not found.inside[0]:
+            allowed = f"must be on the surface of {view.profile_body}"
+            raise ModelError("fatigue.crack.at", self.at, allowed)
+        return found
+
+    def values(self, run: FinishedRun, cycle: StressCycle, void: Bools) -> Values:
+        """Return the quantities of a run; ``void`` are cycles (n,) for which K does not hold."""
+        view, body = run.view, run.view.profile_body
+        sampler = self.sampler(run.system, view)
         cycle_of = np.arange(len(cycle.of)), cycle.of
         which = csr_array((np.ones(len(cycle.of)), cycle_of))
         across, up = (1.0, 0.0) if len(view.axis.along) == 3 else view.axis.along

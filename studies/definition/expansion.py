@@ -92,6 +92,9 @@ class Expansion:
         for index in self._indices():
             try:
                 parameters = self._parameters(index)
+                for output in self._scene.outputs:
+                    if hasattr(output, "fits"):
+                        output.fits(self._scene.view(parameters))
             except ModelError as error:
                 if error.field not in refused:
                     refused[error.field] = self.located(error, index)

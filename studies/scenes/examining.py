@@ -19,7 +19,7 @@ from studies.scenes.checking import (
 from studies.scenes.description import Description
 from studies.scenes.effort import too_long
 from studies.scenes.refusals import Where, dotted
-from studies.scenes.results import places_of, view_of
+from studies.scenes.results import fatigue_of, places_of, view_of
 from studies.scenes.shipped import is_built_in
 
 _NEAR = 0.1
@@ -96,6 +96,9 @@ def _build(builder: Builder, scene: tables.SceneFile) -> None:
             builder.attempt("results", lambda: Samples(system, view_of(scene)))
             if not any(each.field.startswith("results") for each in builder.mistakes):
                 builder.mistakes += _places_outside(system, scene)
+            if scene.fatigue is not None and not builder.mistakes:
+                made = fatigue_of(scene.fatigue, view_of(scene))
+                builder.attempt("", lambda: made.before(None, system, view_of(scene)))
 
 
 def _places_outside(system: System, scene: tables.SceneFile) -> Iterator[StudyError]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import fields, make_dataclass, replace
+from dataclasses import dataclass, fields, make_dataclass, replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -87,7 +87,7 @@ def _scene_of(description: Description, scene: tables.SceneFile) -> FileScene:
             *(partial(_output, description, word) for word in scene.results.words),
             partial(_at_places, description),
             *([_over_cycles] if scene.repeat else []),
-            *([partial(_fatigue, description)] if scene.fatigue else []),
+            *([_Assessed(description)] if scene.fatigue else []),
         ),
         costs=(cost,),
         until=partial(_until, description),
@@ -189,11 +189,24 @@ def _at_places(description: Description, run: FinishedRun) -> Values:
     return at_named_places(run, _places(description, run.parameters), times)
 
 
-def _fatigue(description: Description, run: FinishedRun) -> Values:
-    table = _tables(description, run.parameters).fatigue
-    assert table is not None
-    made = fatigue_of(table, run.view)
-    return made(run, _places(description, run.parameters).lines)
+@dataclass(frozen=True, slots=True)
+class _Assessed:
+    """The output of the table ``fatigue``."""
+
+    description: Description
+
+    def before(self, parameters: Any, system: Any, view: View) -> None:
+        """See `solver.results.fatigue.Fatigue`."""
+        self._made(parameters, view).before(parameters, system, view)
+
+    def __call__(self, run: FinishedRun) -> Values:
+        made = self._made(run.parameters, run.view)
+        return made(run, _places(self.description, run.parameters).lines)
+
+    def _made(self, parameters: Any, view: View) -> Any:
+        table = _tables(self.description, parameters).fatigue
+        assert table is not None
+        return fatigue_of(table, view)
 
 
 def _over_cycles(run: FinishedRun) -> Values:

@@ -133,6 +133,7 @@ _FORMULAS = """
     fatigue_plane_y fatigue_plane_z fatigue_plastic_strain fatigue_applies
     instant fatigue_path_hydrostatic fatigue_path_shear fatigue_path_limit
     crack_K_largest crack_K_smallest crack_K_range crack_arrest_depth crack_least_range
+    crack_applies
     wear_depth slip_length slip_work slip_share fretting_parameter
     tip tip_x tip_y tip_z K_I K_II K_I_faces K_II_faces
     computed_accuracy spin_moment wheel_surface pass_load pass_lateral_position pass_traction

@@ -29,13 +29,14 @@ from solver.fatigue import (
     surface_index,
     t_gamma,
 )
-from solver.fatigue.kernels import balls, resolve
+from solver.fatigue.kernels import balls
 from solver.fatigue.planes import (
     _FALLS,
     _FULL,
     _NORMALS,
     OnPlanes,
-    _climbed,
+    Value,
+    _Ascent,
     _hemisphere,
     critical_planes,
 )
@@ -62,9 +63,17 @@ def elastic(stress: Array) -> Paths:
     return Paths(stress, strain)
 
 
-def turned(paths: Paths) -> Array:
-    """Return paths (n, n_kinds, 6, n_instants) for kernels."""
-    return np.ascontiguousarray(np.stack(paths.known, axis=1).swapaxes(2, 3))
+def searching(paths: Paths, search: Value, read: Sequence[int] = range(6)) -> _Ascent:
+    """Return what a search knows of paths; it reads some of the values of `OnPlanes`."""
+    x = np.ascontiguousarray(np.stack(paths.known, axis=1).swapaxes(2, 3))
+    return _Ascent(x, np.array(read), search)
+
+
+def acting(cycle: _Ascent, normal: Array) -> OnPlanes:
+    """Return what acts on a plane (3,), or on one (n, 3) of each point."""
+    every = np.arange(len(cycle.paths))
+    normals = np.array(np.broadcast_to(normal, (len(every), 3)), order="C")
+    return OnPlanes(*cycle.resolved(every, normals)[0])
 
 
 def rotated(tensor: Array, turns: Array) -> Array:
@@ -222,19 +231,15 @@ def test_hardly_a_plane_is_worse_than_the_critical_one(kind: str) -> None:
     It may find a little more at one of 100 points: no bound of so little is proved.
     """
     count, criterion = 200, FatemiSocie()
-    paths, points = elastic(paths_of(kind, count)), np.arange(count)
-    used = np.array([[False, True, False], [True, False, False]])
+    paths = elastic(paths_of(kind, count))
+    cycle = searching(paths, criterion.on_plane, (1, 3))
     planes, values = _hemisphere(1000), np.empty((count, 1000))
     for k, plane in enumerate(planes):
-        found = resolve(turned(paths), points, np.tile(plane, (count, 1)), used[:, 0].astype(int))
-        values[:, k] = criterion.on_plane(OnPlanes(*found))
+        values[:, k] = criterion.on_plane(acting(cycle, plane))
     best = values.max(axis=1)
     for _ in range(4):
         start = planes[values.argmax(axis=1)]
-        found = resolve(turned(paths), points, start, used[:, 0].astype(int))
-        far = np.full(count, np.inf)
-        _, found = _climbed(turned(paths), points, criterion.on_plane, used, start, found, far)
-        best = np.maximum(best, criterion.on_plane(OnPlanes(*found)))
+        best = np.maximum(best, cycle.climbed(np.arange(count), start, -np.inf).best)
         values[np.abs(np.einsum("mj,nj->nm", planes, start)) > np.cos(0.05)] = -np.inf
     least = criterion.assess(paths).value / best
     assert least.min() > 1 - 1e-3 and np.sort(least)[count // 100] > 1 - 1e-12
@@ -244,18 +249,14 @@ def test_hardly_a_plane_is_worse_than_the_critical_one(kind: str) -> None:
 def test_the_plane_reported_is_that_of_the_value(criterion: PlaneCriterion) -> None:
     """Of 20 000 paths in all; it is worse than its neighbours, in what is searched."""
     paths = elastic(paths_of("few instants", 4000))
-    found, points, circles = criterion.assess(paths), np.arange(4000), np.array([1, 1])
-
-    def acting(normals: Array) -> OnPlanes:
-        normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-        return OnPlanes(*resolve(turned(paths), points, normals, circles))
-
-    on = acting(found.plane)
+    found, cycle = criterion.assess(paths), searching(paths, criterion.searched)
+    on = acting(cycle, found.plane)
     np.testing.assert_allclose(criterion.on_plane(on), found.value, rtol=1e-9)
     rng, most = np.random.default_rng(6), criterion.searched(on)
     for step in (1e-3, 1e-2):
-        moved = criterion.searched(acting(found.plane + step * rng.normal(size=(4000, 3))))
-        assert (moved <= most * (1 + 1e-9)).all()
+        moved = found.plane + step * rng.normal(size=(4000, 3))
+        moved /= np.linalg.norm(moved, axis=1)[:, None]
+        assert (criterion.searched(acting(cycle, moved)) <= most * (1 + 1e-9)).all()
 
 
 def barely_opened(share: float) -> Paths:
@@ -322,15 +323,13 @@ CURVED: dict[str, Callable[[OnPlanes], Array]] = {
 def test_a_criterion_may_curve_either_way(form: str, kind: str) -> None:
     """No plane of many is worse, and what acts is that on the plane reported."""
     paths, criterion = elastic(paths_of(kind)), CURVED[form]
-    found, points, circles = critical_planes(paths, criterion), np.arange(60), np.array([1, 1])
+    found, cycle = critical_planes(paths, criterion), searching(paths, criterion)
     most = np.full(60, -np.inf)
     for plane in _hemisphere(800):
-        acting = resolve(turned(paths), points, np.tile(plane, (60, 1)), circles)
-        most = np.maximum(most, criterion(OnPlanes(*acting)))
+        most = np.maximum(most, criterion(acting(cycle, plane)))
     value = criterion(found.on)
     assert (value >= most).all()
-    acting = resolve(turned(paths), points, found.normal, circles)
-    np.testing.assert_allclose(value, criterion(OnPlanes(*acting)), rtol=1e-12)
+    np.testing.assert_allclose(value, criterion(acting(cycle, found.normal)), rtol=1e-12)
 
 
 @pytest.mark.parametrize("modulus", [1.0, 1e2, 1e6])

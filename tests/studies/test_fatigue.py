@@ -235,13 +235,46 @@ def test_a_crack_in_constant_and_linear_stress_is_a_closed_form(side: str) -> No
 
 
 @pytest.mark.solves
-def test_a_crack_beyond_the_body_or_its_profiles_is_refused_by_its_run() -> None:
-    """Bodies and profiles of runs differ: the profile of this one goes down to 6 mm."""
+def test_a_crack_beyond_the_body_or_its_profiles_is_refused_when_the_scene_is_read() -> None:
     assert held_block("top", initial=5.9).coordinates["depth"][-1] == 6.0
-    with pytest.raises(ModelError, match=r"crack\.initial = 6\.0: .* depth of profiles, 6 mm"):
+    with pytest.raises(StudyError, match=r"fatigue\.crack\.initial = 6\.0: .* profiles, 6 mm"):
         held_block("top", initial=6.0)
-    with pytest.raises(ModelError, match=r"crack\.at = 4\.5: must be on the surface of block"):
+    with pytest.raises(StudyError, match=r"fatigue\.crack\.at = 4\.5: .* the surface of block"):
         held_block("top", at=4.5)
+
+
+def test_a_crack_beyond_the_profiles_of_any_run_is_refused_when_the_study_is_read() -> None:
+    """The depth of profiles grows with the contact."""
+    content = rolled({"crack": CRACK | {"initial": 10.0}}, load_ratio=1.0).to_dict()
+    del content["parameters"]["load_ratio"]
+    swept = content | {"sweep": {"load_ratio": [0.01, 1.0]}}
+    with pytest.raises(StudyError) as error:
+        Study.from_dict(swept)
+    assert error.value.field == "fatigue.crack.initial" and "load_ratio = 0.01" in str(error.value)
+
+
+@pytest.mark.solves
+def test_a_crack_outside_a_body_is_refused_before_the_first_increment() -> None:
+    """Where a body of a scene of the package is, is known once it has a mesh."""
+    content = {"name": "far", "scene": "punch", "parameters": {"accuracy": "draft"}}
+    far = Study.from_dict(content | {"fatigue": {"crack": CRACK | {"at": 1e4}}})
+    scene, (path,) = far.problem, far.paths()
+    begun: list[float] = []
+    with pytest.raises(ModelError, match=r"fatigue\.crack\.at = 10000\.0"):
+        list(scene.path(path.parameters, [1.0], begun.append))
+    assert not begun
+
+
+@pytest.mark.solves
+def test_k_of_a_cycle_that_strains_plastically_is_not_applicable() -> None:
+    """At the default parameters of the scene, 2.7 of the yield stress without hardening."""
+    content = {"name": "default", "scene": "rolling", "fatigue": {"crack": CRACK}}
+    record = record_of(Study.from_dict(content | {"parameters": {"accuracy": "draft"}}))
+    assert record.scalars["crack_applies"] == Applies.NOT_APPLICABLE
+    assert record.scalars["fatigue_plastic_strain"] > 1e-4
+    assert np.isnan(record.fields["crack_K_range"][1]).all()
+    elastic = record_of(rolled({"crack": CRACK}, load_ratio=0.8))
+    assert elastic.scalars["crack_applies"] == Applies.APPLICABLE
 
 
 @pytest.mark.solves
