@@ -36,9 +36,10 @@ ball or a cone. The contact of these grows vertex by vertex: derivatives change 
 difference of 1e-6 has an error of 2e-5 (measured; ten times as large with ten times the step)."""
 GROWING = ("ball", "cone")
 SIZES = ("radius", "width", "height", "length", "diameter", "depth", "pressed_in", "ream", "hole")
-CURVED = 0.1
-"""Share of the difference between both sides by which a derivative may differ besides: a neighbour,
-with a step of a tenth of theirs, is off by half of a tenth of it where a number is curved."""
+CURVED, CURVED_BY_SIZE = 0.1, 0.5
+"""Share of the difference between both sides by which a derivative may differ besides. Where a
+number is curved, a neighbour with a step of a tenth of theirs is off by half of a tenth of it; by a
+size, which moves the nodes, its step is theirs, and it is off by half of it."""
 TIGHT = partial(Control, tolerances=Tolerances(residual=1e-11, contact=1e-10))
 MESH = ("accuracy", "size", "element", "growth", "step", "hosford", "exponent")
 """Words in the names of parameters that are not derived by: they shape meshes, or are exponents."""
@@ -148,12 +149,14 @@ def compared(one: Drawn, rng: np.random.Generator) -> Iterator[tuple[str, str, s
         if len({*counts}) > 1:
             yield name, "other increments", str(counts)
         else:
-            sized = one.name in GROWING or any(word in name for word in SIZES)
-            yield name, *_judged(name, own, ends, of, MOVED if sized else TOLERANCE)
+            sized = any(word in name for word in SIZES)
+            tolerance = MOVED if sized or one.name in GROWING else TOLERANCE
+            curved = CURVED_BY_SIZE if sized else CURVED
+            yield name, *_judged(name, own, ends, of, tolerance, curved)
 
 
 def _judged(
-    name: str, own: Any, ends: Sequence[Any], of: Sequence[str], tolerance: float
+    name: str, own: Any, ends: Sequence[Any], of: Sequence[str], tolerance: float, curved: float
 ) -> tuple[str, str]:
     """Return the verdict on the derivatives by a parameter, and the worst of them."""
     value, worst, lacks = getattr(own.parameters, name), ("", 0.0), 0
@@ -164,7 +167,7 @@ def _judged(
             continue
         more, less = (end.scalars[each] for end in ends)
         expected = (more - less) / (2 * SHARE)
-        bent = CURVED * abs(more + less - 2 * own.scalars[each]) / SHARE
+        bent = curved * abs(more + less - 2 * own.scalars[each]) / SHARE
         off = max(abs(found - expected) - bent, 0.0)
         error = off / max(abs(own.scalars[each]), abs(expected), 1e-9)
         if not error <= worst[1]:  # also one that is not a number
