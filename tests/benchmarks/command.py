@@ -17,12 +17,13 @@ from tests.benchmarks import (
     punch,
     rolling,
     skips,
+    stages,
     steady,
     sweep,
     walls,
 )
 from tests.benchmarks.measure import REPEATS, Point
-from tests.benchmarks.report import conditions, table, write_csv
+from tests.benchmarks.report import conditions, store, table
 from tests.stress.measure import Figure
 
 PUNCH_FIGURES = {
@@ -41,7 +42,7 @@ ALONE = {f"{n} alone": text for n, text in punch.MEASURES.items() if n != "plate
 
 SLOW = ("prism", "accuracy", "growth", "memory", "pairs", "table", "sweep")
 """Measured where they are named alone."""
-NAMES = ("hertz", "walls", "punch", "steady", "rolling", "skips", *SLOW)
+NAMES = ("hertz", "walls", "punch", "steady", "rolling", "stages", "skips", *SLOW)
 
 
 def run(arguments: Sequence[str] | None = None) -> None:
@@ -61,6 +62,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
         "punch": lambda: of_punch(given.out, plan, repeats),
         "steady": lambda: of_steady(given.out, quick=given.quick, repeats=repeats),
         "rolling": lambda: of_rolling(given.out, quick=given.quick, repeats=repeats),
+        "stages": lambda: of_stages(given.out, quick=given.quick),
         "skips": lambda: of_skips(repeats),
         "prism": lambda: of_prism(given.out, quick=given.quick, repeats=repeats),
         "accuracy": lambda: of_accuracy(given.out, quick=given.quick, repeats=repeats),
@@ -75,7 +77,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
 
 
 def benchmark(out: Path, problems: Sequence[Callable[[], list[str]]]) -> None:
-    """Measure problems, write CSV and PNG files into ``out``, and print the tables."""
+    """Measure problems, write results and pictures into ``out``, and print the tables."""
     out.mkdir(parents=True, exist_ok=True)
     started = time.perf_counter()
     lines = conditions()
@@ -93,7 +95,7 @@ def of_hertz(out: Path, elements: Sequence[str], meshes: Sequence[int], repeats:
     points = hertz.measure(elements, meshes, repeats)
     title = "Hertz line contact (elements)"
     figures.draw(points, hertz.MEASURES, elements, title, out / "hertz.png")
-    write_csv(points, out / "hertz.csv")
+    store(points, out)
     title = "Hertz line contact, errors relative to the closed form"
     return [title, *table(points, tuple(hertz.MEASURES))]
 
@@ -105,7 +107,7 @@ def of_punch(out: Path, plan: punch.Plan, repeats: int) -> list[str]:
         figures.draw(points, punch.MEASURES, series, title, out / f"punch-{name}.png")
     title = "Punch: what the increments add (on one mesh, against the limit of the series)"
     figures.draw(points, ALONE, ("load_step", "unload_steps"), title, out / "punch-increments.png")
-    write_csv(points, out / "punch.csv")
+    store(points, out)
     return [
         "Punch, errors against the finest run (plateau: against Re)",
         *table(points, tuple(punch.MEASURES)),
@@ -120,7 +122,7 @@ def of_punch(out: Path, plan: punch.Plan, repeats: int) -> list[str]:
 def of_walls(out: Path, *, quick: bool, repeats: int) -> list[str]:
     """Measure thick walls, draw them, and return their tables."""
     points = walls.measure(quick, repeats)
-    write_csv(points, out / "walls.csv")
+    store(points, out)
     lines = []
     for wall in walls.WALLS:
         title = f"Thick {wall} beyond yield: residual hoop stress against the closed form"
@@ -157,7 +159,7 @@ def of_load(
     series: Sequence[str],
 ) -> list[str]:
     """Write and draw the points, and return the table of those of one load."""
-    write_csv(points, out / f"{name}.csv")
+    store(points, out)
     own = [p for p in points if p.setting.endswith(load)]
     title = f"{own[0].problem.capitalize()}, {load}: what accuracy costs"
     figures.draw(own, measures, series, title, out / f"{name}-{load}.png")
@@ -168,7 +170,7 @@ def of_load(
 def of_prism(out: Path, *, quick: bool, repeats: int) -> list[str]:
     """Measure passes over a prism, draw them, and return their tables."""
     points = prism.measure(quick, repeats)
-    write_csv(points, out / "prism.csv")
+    store(points, out)
     lines = []
     for load in prism.loads(quick):
         own = [p for p in points if p.setting.endswith(load)]
@@ -176,6 +178,14 @@ def of_prism(out: Path, *, quick: bool, repeats: int) -> list[str]:
         figures.draw(own, prism.MEASURES, prism.SERIES, title, out / f"prism-{load}.png")
         lines += [title, *table(own, tuple(prism.MEASURES), prism.VALUES), ""]
     return lines
+
+
+def of_stages(out: Path, *, quick: bool) -> list[str]:
+    """Measure the stages of first runs, and return their table."""
+    points = stages.measure(quick)
+    store(points, out)
+    title = "Stages of a first run, processor time [s], and peak memory [MB]"
+    return [title, *table(points, (), stages.STAGES)]
 
 
 def of_skips(repeats: int) -> list[str]:
@@ -189,7 +199,7 @@ def of_skips(repeats: int) -> list[str]:
 def of_accuracy(out: Path, *, quick: bool, repeats: int) -> list[str]:
     """Measure the levels of `accuracy`, draw them, and return their table."""
     points = accuracy.measure(quick, repeats)
-    write_csv(points, out / "accuracy.csv")
+    store(points, out)
     ((measure, text),) = accuracy.MEASURES.items()
     figures.draw_levels(points, measure, text, out / "accuracy.png")
     return [text[0].upper() + text[1:], *table(points, (measure,))]
@@ -198,7 +208,7 @@ def of_accuracy(out: Path, *, quick: bool, repeats: int) -> list[str]:
 def of_growth(out: Path, *, quick: bool, repeats: int) -> list[str]:
     """Measure how cost grows with the mesh, and return its table."""
     points, exponents = growth.measure(quick, repeats)
-    write_csv(points, out / "growth.csv")
+    store(points, out)
     title = "Processor time over unknowns"
     return [title, *table(points, (), ("iterations",)), *map(str, exponents)]
 

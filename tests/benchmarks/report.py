@@ -1,19 +1,24 @@
-"""The table, the CSV file, and the conditions they were measured under."""
+"""The table, the file of results, and the conditions they were measured under."""
 
 from __future__ import annotations
 
-import csv
+import json
 import math
 import os
 import platform
+import re
 from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
+from resource import RUSAGE_SELF, getrusage
 
 import numpy as np
 
 from solver import __version__
 from solver.linear import pardiso
+from solver.linear.solvers import chosen
 from tests.benchmarks.measure import Point
 
 
@@ -72,20 +77,22 @@ def _order(before: Point | None, point: Point, measure: str) -> str:
     return f"({math.log(pair[0] / pair[1]) / math.log(pair[2] / pair[3]):.1f})"
 
 
-def write_csv(points: Sequence[Point], path: Path) -> None:
-    """Write every point: cost, values and errors in columns, empty where there is none."""
-    values = sorted({name for p in points for name in p.values})
-    errors = sorted({name for p in points for name in p.errors})
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(
-            ["problem", "series", "setting", "unknowns", "cpu_seconds", "spread", "repeats"]
-            + values
-            + [f"error of {name}" for name in errors]
-        )
-        for p in points:
-            writer.writerow(
-                [p.problem, p.series, p.setting, p.unknowns, p.cpu, p.spread, p.repeats]
-                + [p.values.get(name, "") for name in values]
-                + [p.errors.get(name, "") for name in errors]
-            )
+def store(points: Sequence[Point], out: Path) -> None:
+    """Write the points of a problem into the JSON file of this machine, beside those of others.
+
+    It has the date and the conditions of each problem, and the peak memory of the process until
+    then [MB].
+    """
+    path = out / f"{re.sub('[^a-z0-9]+', '-', _processor().lower()).strip('-')}.json"
+    found = json.loads(path.read_text()) if path.exists() else {}
+    problem, series = points[0].problem, []
+    for point in points:
+        series.append({k: v for k, v in asdict(point).items() if v == v and k != "problem"})
+    found[problem] = {
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "conditions": conditions(),
+        "linear_solver": chosen("auto"),
+        "peak_memory": round(getrusage(RUSAGE_SELF).ru_maxrss / 1e3),
+        "points": series,
+    }
+    path.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")

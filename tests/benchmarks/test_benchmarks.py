@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import csv
+import json
 import time
 from dataclasses import replace
 from functools import partial
@@ -19,6 +19,7 @@ from tests.benchmarks.command import (
     of_prism,
     of_punch,
     of_rolling,
+    of_stages,
     of_steady,
     of_walls,
 )
@@ -57,25 +58,37 @@ def longer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def rows(path: Path) -> dict[str, dict[str, float]]:
-    """Return the numbers of a CSV file by series and setting."""
-    with path.open() as file:
-        return {
-            f"{row['series']} {row['setting']}": {
-                k: float(v) for k, v in list(row.items())[3:] if v
-            }
-            for row in csv.DictReader(file)
+def rows(out: Path, problem: str) -> dict[str, dict[str, float]]:
+    """Return the numbers of a problem in the file of the machine, by series and setting."""
+    (path,) = out.glob("*.json")
+    found = json.loads(path.read_text())[problem]
+    assert found["peak_memory"] > 50 and found["linear_solver"] in ("pardiso", "superlu")
+    return {
+        f"{point['series']} {point['setting']}": {
+            **point["values"], **{f"error of {name}": e for name, e in point["errors"].items()}
         }
+        for point in found["points"]
+    }  # fmt: skip
 
 
 def test_errors_of_hertz_contact_halve_with_the_mesh(written: Path) -> None:
-    hertz = rows(written / "hertz.csv")
+    hertz = rows(written, "hertz")
     assert hertz["quad4 a/8"]["error of pressure"] < 0.6 * hertz["quad4 a/4"]["error of pressure"]
+
+
+def test_stages_of_a_run_add_up_to_its_time(tmp_path: Path) -> None:
+    """Another problem's results stay in the file of the machine."""
+    of_hertz(tmp_path, ("quad4",), (4,), 1)
+    of_stages(tmp_path, quick=True)
+    ((name, found),) = rows(tmp_path, "stages").items()
+    assert name == "punch draft"
+    assert min(found[stage] for stage in ("imports", "states", "audit", "results")) > 0
+    assert rows(tmp_path, "hertz")
 
 
 @pytest.mark.long
 def test_errors_of_a_steady_pass_fall_with_the_mesh(longer: Path) -> None:
-    steady = rows(longer / "steady.csv")
+    steady = rows(longer, "steady pass")
     for depth in (2, 5):
         coarse, fine = (steady[f"mesh {h} mm, free"][f"error of {depth} mm"] for h in (4, 2))
         assert fine < 0.8 * coarse, depth
@@ -83,14 +96,14 @@ def test_errors_of_a_steady_pass_fall_with_the_mesh(longer: Path) -> None:
 
 @pytest.mark.long
 def test_errors_of_rolling_by_increments_fall_with_the_mesh(longer: Path) -> None:
-    rolling = rows(longer / "rolling.csv")
+    rolling = rows(longer, "rolling")
     coarse, fine = (rolling[f"mesh {h} mm, free"]["error of first row"] for h in (4, 2))
     assert 0 < fine < 0.8 * coarse
 
 
 @pytest.mark.long
 def test_errors_of_a_pass_over_a_prism_fall_with_the_elements(longer: Path) -> None:
-    prism = rows(longer / "prism.csv")
+    prism = rows(longer, "prism")
     coarse, fine = (prism[f"section {h} mm, ellipse"] for h in ("3.33", "2"))
     for measure in ("mean", "largest"):
         assert 0 < fine[f"error of {measure}"] < 0.7 * coarse[f"error of {measure}"]
@@ -100,7 +113,7 @@ def test_errors_of_thick_walls_fall_with_the_mesh_at_the_order_of_the_element(
     written: Path,
 ) -> None:
     """By 2 or more where the element is quadratic and does not lock; the table says so."""
-    walls = rows(written / "walls.csv")
+    walls = rows(written, "walls")
     for name, least in (("quad8 {0} x {0}, cylinder", 1.8), ("quad8 {0} x {0}, sphere", 1.8),
                         ("quad4 {0} x {0}, cylinder", 0.8)):  # fmt: skip
         coarse, fine = (walls[name.format(n)]["error of mean"] for n in (8, 16))
@@ -117,7 +130,7 @@ def test_errors_of_thick_walls_fall_with_the_mesh_at_the_order_of_the_element(
 @pytest.mark.long
 def test_a_level_of_accuracy_has_an_error_against_a_finer_run(longer: Path) -> None:
     """Draft against sides of two thirds, from 1 mm down and at the first row: some percent."""
-    (draft,) = rows(longer / "accuracy.csv").values()
+    (draft,) = rows(longer, "accuracy").values()
     assert 1.0 < draft["error of largest"] < 15.0
 
 
@@ -157,7 +170,7 @@ def test_the_exponent_of_growth_is_that_of_a_power() -> None:
 
 @pytest.mark.long
 def test_errors_of_the_punch_are_distances_from_its_references(longer: Path) -> None:
-    punches = rows(longer / "punch.csv")
+    punches = rows(longer, "punch")
     finest, mesh, step = (
         punches[name] for name in ("finest reference", "mesh base", "load_step 0.1")
     )
