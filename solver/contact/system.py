@@ -19,7 +19,7 @@ from solver.contact.state import BodyState, ContactState, Converged, State
 from solver.errors import ModelError
 from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation
-from solver.fem.fields import Sampler, recovery
+from solver.fem.fields import Sampler, recovery, sampler
 from solver.fem.large import LargeDiscretisation
 from solver.fem.operators import Operator, Operators, operators_of
 from solver.fem.part import Part
@@ -443,7 +443,7 @@ class System:
 
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return a sampler of nodal fields of a body at positions (2, n) [mm]."""
-        return Sampler(self.full(name), X)
+        return sampler(self.full(name), X)
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to those at nodes."""

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array, diags_array, hstack
 from scipy.spatial import cKDTree
 
 from solver.contact.state import BodyState
-from solver.fem.fields import Sampler, recovery
+from solver.fem.fields import Sampler, recovery, sampler
 from solver.fem.rigid import RigidMotion
 from solver.results.acting import Acting, contact_patches
 from solver.results.fields import StressCycle
@@ -45,7 +45,7 @@ class TrackBody(SteadyBody):
 
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return the interpolation of nodal fields at positions (2, n) [mm]."""
-        return Sampler(self.part, X)
+        return sampler(self.part, X)
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n) from values at points and at the surface to nodes.

@@ -15,10 +15,9 @@ from scipy.sparse import csr_array
 from skfem import CellBasis
 
 from solver.contact.state import BodyState
-from solver.fem.fields import Sampler, recovery
+from solver.fem.fields import Sampler, recovery, sampler
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
-from solver.memory import kept
 from solver.model.body import Body
 from solver.results.acting import Acting
 from solver.results.fields import StressCycle
@@ -27,7 +26,6 @@ from solver.rolling.load import LOADED, RELEASED
 from solver.rolling.passing import Pass
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import PatchContact
-from solver.rolling.rail.section import Section
 from solver.rolling.rail.track import PrismTrack
 from solver.rolling.results.stage import PassStage, SteadyBody
 from solver.tensors import not_below_zero, to_tensor, von_mises
@@ -77,7 +75,7 @@ class PrismBody(SteadyBody):
 
     def sampler(self, name: str, X: Array) -> Sampler:
         """Return the interpolation of nodal fields at positions (3, n) [mm]; x has no effect."""
-        return _sampler(self.track.section, np.ascontiguousarray(X[[2, 1]]).tobytes())
+        return sampler(self.track.section.plane, X[[2, 1]])
 
     def recovery(self, name: str) -> csr_array:
         """Return the matrix (n_nodes, n_points) from values at points to nodes."""
@@ -140,13 +138,6 @@ class PrismBody(SteadyBody):
         stress = self._law.stiffness(6) @ (strain.T - plastic.plastic_strain)
         found = self.state_of(time, u, stress, plastic)
         return replace(found, strain=found.strain - self.track.initial_strain.T)
-
-
-@kept
-def _sampler(section: Section, positions: bytes) -> Sampler:
-    """Return the interpolation at positions (2, n) in a section; runs over a prism share it."""
-    x = np.frombuffer(positions).reshape(2, -1)
-    return Sampler(section.plane, x)
 
 
 def in_space(plane: Array) -> Array:
