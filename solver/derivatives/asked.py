@@ -27,8 +27,9 @@ _SHARE = 0.3
 surfaces slide far."""
 
 
-_AT_A_SWITCH = 1e-5
-"""Relative change of a parameter: derivatives that hold for less may differ on both sides of it."""
+_AT_A_SWITCH = 3e-5
+"""Relative change of a parameter, as the widest difference: derivatives that hold for less may
+differ on both sides of it."""
 _DOUBTED = 1e-3
 """Largest `audit_derivatives` without a warning; usual are 1e-9 to 1e-5, and more where a result is
 near zero and known up to rounding."""

@@ -281,9 +281,9 @@ def _slopes(first: Mapping[str, Any], after: Mapping[str, Any], step: float) -> 
 
 
 def _fineness(mesh: Mesh) -> float:
-    """Return the extent of a mesh over its shortest edge."""
-    start, end = np.moveaxis(mesh.p[:, mesh.facets], 1, 0)
-    return float(np.ptp(mesh.p, axis=1).max() / np.linalg.norm(end - start, axis=0).min())
+    """Return the extent of a mesh over its shortest edge, in space over its smallest face."""
+    sides = np.linalg.norm(np.ptp(mesh.p[:, mesh.facets], axis=1), axis=0)
+    return float(np.ptp(mesh.p, axis=1).max() / sides.min())
 
 
 def _largest(values: Any) -> float:

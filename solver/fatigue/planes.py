@@ -149,9 +149,9 @@ def _axes(paths: Array) -> Array:
     x = paths[:, 0]
     products = x @ x.swapaxes(1, 2)
     _, axes = np.linalg.eigh(products[:, _FULL[:, :, None], _FULL].sum(axis=2))
-    late = (x @ np.arange(1.0, x.shape[2] + 1))[:, _FULL]
-    late = axes.swapaxes(1, 2) @ late @ axes
-    axes[:, :, 1:] *= np.where(late[:, :1, 1:] < 0, -1.0, 1.0)
+    mean = (x @ np.arange(1.0, x.shape[2] + 1))[:, _FULL]
+    mean = axes.swapaxes(1, 2) @ mean @ axes
+    axes[:, :, 1:] *= np.where(mean[:, :1, 1:] < 0, -1.0, 1.0)
     return np.asarray(axes)
 
 
@@ -262,9 +262,12 @@ class _Ascent(NamedTuple):
     def climbed(
         self, points: Ints, normal: Array, top: Array | float, falls: Array | float = np.inf
     ) -> _Planes:
-        """Return the maxima near planes, unless they are lower than others of the same point.
+        """Return the maxima near planes that may be the highest of a point, others as they are.
 
-        Or than `top` (n_points,). Planes that are lower than the highest by `falls` stay.
+        Parameters
+        ----------
+        top : highest values of the points (n_points,) that are known already
+        falls : only planes are climbed from that are lower than the highest by at most so much
         """
         values, best, active = self.resolved(points, normal)
         ways = np.zeros((len(points), 2, 3))
@@ -362,7 +365,8 @@ def _starts(cycle: _Ascent) -> tuple[Ints, Array, Array, Array]:
 def _check(cycle: _Ascent, values: Array, *found: Array) -> None:
     """Refuse a criterion that is not finite, or falls where what acts on planes rises."""
     search = cycle.search
-    name = getattr(search, "__qualname__", type(search).__name__)
+    owner = getattr(search, "__self__", search)
+    name = getattr(owner, "__qualname__", type(owner).__name__)
     if not all(np.isfinite(own).all() for own in found):
         allowed = "must be finite for all amplitudes from zero and all normal stresses"
         raise ModelError("criterion", name, allowed)
@@ -404,9 +408,10 @@ def _bounds(paths: Array, circles: Ints) -> tuple[Array, Array, Array]:
     """
     bounds, sizes = np.empty((2, 3 * len(circles), len(paths), len(_NORMALS))), []
     for k, circle in enumerate(circles):
-        x = np.array(paths[:, k].swapaxes(1, 2), dtype=np.float32, order="C")
-        shear, (normal, half) = _scan(x, _NORMALS, circle)
-        apart = _ROUNDED * np.abs(x).max(axis=(1, 2))[:, None]
+        size = np.maximum(np.abs(paths[:, k]).max(axis=(1, 2)), 1e-300)[:, None]
+        x = (paths[:, k] / size[:, :, None]).swapaxes(1, 2).astype(np.float32, order="C")
+        shear, (normal, half) = (size * each for each in _scan(x, _NORMALS, circle))
+        apart = _ROUNDED * size
         bounds[0, 3 * k : 3 * k + 3] = shear[0], normal, half
         bounds[1, 3 * k : 3 * k + 3] = shear[1] + circle * apart, normal + apart, half + apart
         most, widest = normal.max(axis=1), half.max(axis=1)

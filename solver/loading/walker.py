@@ -311,5 +311,5 @@ def _repeated(walk: _Walk, cycle: int) -> _Walk:
 
 def _as_near(now: Converged, loaded: Converged) -> Converged:
     """Return a state whose neighbours have come as near to a switch as those under load."""
-    both = zip(now.beside, loaded.beside, strict=True)
+    both = zip(now.beside, loaded.beside, strict=False)  # none under load if one has failed there
     return replace(now, beside=tuple(replace(own, near=other.near) for own, other in both))

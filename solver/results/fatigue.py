@@ -11,7 +11,7 @@ thousandth of the largest range of strain: such points are NaN, the numbers too,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -128,10 +128,10 @@ class Fatigue:
             raise ModelError(f"limits.{error.field}", error.value, error.allowed) from None
         return cls(criterion=made, crack=held, **more)
 
-    def fits(self, view: View) -> None:
+    def fits(self, _parameters: Any, view: Callable[[], View]) -> None:
         """Refuse what runs with a view cannot have: see `SurfaceCrack.fits`."""
         if self.crack is not None:
-            self.crack.fits(view)
+            self.crack.fits(view())
 
     def before(self, _parameters: Any, system: Any, view: View) -> None:
         """Refuse what a run cannot have, before its first increment: see `SurfaceCrack.sampler`."""

@@ -6,8 +6,9 @@ field ``body`` is the name of a body. Such a class may have ``watch(system, conv
 returns numbers of every increment (quantities over the dimension ``increment``), and
 ``warnings(run)``, which returns texts for the user.
 
-An output of a scene may refuse (`ModelError`) what runs cannot have: ``fits(view)`` when a study is
-read, and ``before(parameters, system, view)`` before the first increment of a run.
+An output of a scene may refuse (`ModelError`) what runs cannot have: ``fits(parameters, view)``
+when a study is read, where ``view()`` makes the `View`, and ``before(parameters, system, view)``
+before the first increment of a run.
 """
 
 from __future__ import annotations

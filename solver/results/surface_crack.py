@@ -72,9 +72,12 @@ class SurfaceCrack:
         at = view.station[len(view.station) // 2] if self.at is None else self.at
         at = abs(at) if view.symmetric else at
         found = system.sampler(view.profile_body, replace(view, station=np.array([at])).profiles)
-        if self.at is not None and not found.inside[0]:
+        if not found.inside[0]:
             allowed = f"must be on the surface of {view.profile_body}"
-            raise ModelError("fatigue.crack.at", self.at, allowed)
+            raise ModelError("fatigue.crack.at", at, allowed)
+        if not found.inside[view.depth <= self.initial].all():
+            allowed = f"must be less than the depth of {view.profile_body} there"
+            raise ModelError("fatigue.crack.initial", self.initial, allowed)
         return found
 
     def values(self, run: FinishedRun, cycle: StressCycle, void: Bools) -> Values:

@@ -6,6 +6,7 @@ import itertools
 import math
 import reprlib
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 from solver.errors import ModelError
@@ -94,7 +95,7 @@ class Expansion:
                 parameters = self._parameters(index)
                 for output in self._scene.outputs:
                     if hasattr(output, "fits"):
-                        output.fits(self._scene.view(parameters))
+                        output.fits(parameters, partial(self._scene.view, parameters))
             except ModelError as error:
                 if error.field not in refused:
                     refused[error.field] = self.located(error, index)

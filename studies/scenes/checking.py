@@ -52,10 +52,9 @@ def _fatigue(scene: tables.SceneFile) -> Iterator[StudyError]:
     for body in scene.fatigue.bodies:
         yield from _one_of("fatigue.bodies", body, scene.bodies)
     try:
-        fatigue_of(scene.fatigue, view_of(scene)).fits(view_of(scene))
+        fatigue_of(scene.fatigue, view_of(scene))
     except ModelError as error:
-        field = f"fatigue.{error.field.removeprefix('fatigue.')}"
-        yield StudyError(field, error.value, error.allowed)
+        yield StudyError(f"fatigue.{error.field}", error.value, error.allowed)
 
 
 def failed_checks(scene: tables.SceneFile, values: Mapping[str, Any]) -> Iterator[StudyError]:

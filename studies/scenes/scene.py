@@ -195,6 +195,10 @@ class _Assessed:
 
     description: Description
 
+    def fits(self, parameters: Any, view: Callable[[], View]) -> None:
+        """See `solver.results.fatigue.Fatigue`."""
+        self._made(parameters, view()).fits(parameters, view)
+
     def before(self, parameters: Any, system: Any, view: View) -> None:
         """See `solver.results.fatigue.Fatigue`."""
         self._made(parameters, view).before(parameters, system, view)

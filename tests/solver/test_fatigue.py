@@ -494,3 +494,26 @@ def test_no_plane_is_farther_from_those_of_the_scan_than_the_bound_says() -> Non
         normals = (far[:, None] + width * rng.standard_normal((200, 100, 3))).reshape(-1, 3)
     assert 0.1355 < largest
     assert 2 * np.sin(largest) ** 2 < _FALLS
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 40])
+def test_amplitudes_of_shear_are_radii_of_smallest_balls(count: int) -> None:
+    """Instants repeat, as where a cycle begins and ends at rest."""
+    rng = np.random.default_rng(count)
+    stress = rng.normal(size=(300, count, 6)).repeat(2, axis=1)
+    normal = rng.normal(size=(300, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    shear = acting(searching(Paths(stress), Findley(torsion=1.0, sensitivity=0.2).on_plane), normal).shear
+    traction = stress[:, :, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] @ normal[:, None, :, None]
+    along = traction[..., 0] - (traction[..., 0] @ normal[:, :, None]) * normal[:, None]
+    _, radii = balls(np.ascontiguousarray(along.swapaxes(1, 2)))
+    np.testing.assert_allclose(shear, radii, rtol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1e-25, 1e25])
+def test_planes_do_not_depend_on_the_unit_of_stress(unit: float) -> None:
+    stress = np.random.default_rng(3).normal(size=(20, 9, 6))
+    criterion = Findley(torsion=352.0, sensitivity=0.2)
+    own, other = (criterion.assess(Paths(u * stress)) for u in (1.0, unit))
+    np.testing.assert_allclose(other.value, unit * own.value, rtol=1e-9)
+    np.testing.assert_allclose(other.plane, own.plane, atol=1e-6)

@@ -178,11 +178,11 @@ UP = {
 """Blocks with a free side, along which they are pulled: they keep a stress along it."""
 
 
-def held_block(side: str, **changed: Any) -> Any:
-    """Return the record of a block with -60 - 20 depth along its free side, pulled by 100 MPa."""
+def held(side: str, **changed: Any) -> dict[str, Any]:
+    """Return a scene file of a block with -60 - 20 depth along its free side, pulled by 100 MPa."""
     opened, depth = ("xx", "-y") if side == "top" else ("yy", "x")
     box, supports, boundary, axis = UP[side]
-    content: dict[str, Any] = {
+    return {
         "name": "held",
         "materials": {"steel": {"youngs_modulus": 2e5, "poisson_ratio": 0.3}},
         "bodies": {"block": {
@@ -201,7 +201,11 @@ def held_block(side: str, **changed: Any) -> Any:
         },
         "fatigue": {"crack": CRACK | changed},
     }  # fmt: skip
-    scene = built(content)
+
+
+def held_block(side: str, **changed: Any) -> Any:
+    """Return the record of `held`."""
+    scene = built(held(side, **changed))
     (record,) = scene.path(scene.parameters(), [], lambda done: None)
     assert record.status.name == "OK", record.message
     return record
@@ -241,6 +245,24 @@ def test_a_crack_beyond_the_body_or_its_profiles_is_refused_when_the_scene_is_re
         held_block("top", initial=6.0)
     with pytest.raises(StudyError, match=r"fatigue\.crack\.at = 4\.5: .* the surface of block"):
         held_block("top", at=4.5)
+    deeper = held("top", initial=8.5)
+    deeper["results"]["profile"]["depth"]["stop"] = 9.0
+    with pytest.raises(StudyError, match=r"fatigue\.crack\.initial = 8\.5: .* depth of block"):
+        built(deeper)
+
+
+@pytest.mark.solves
+def test_a_crack_of_a_study_may_be_deeper_than_the_default_profile_of_its_scene() -> None:
+    content = held("top") | {
+        "parameters": {"deep": {"default": 3.0, "description": "depth", "unit": "mm"}}
+    }
+    content["results"]["profile"]["depth"]["stop"] = "$deep"
+    del content["fatigue"]
+    scene = assessed(built(content), {"crack": CRACK | {"initial": 5.0}})
+    (record,) = scene.path(scene.parameters(deep=6.0), [], lambda done: None)
+    assert record.scalars["crack_applies"] == Applies.APPLICABLE
+    with pytest.raises(ModelError, match=r"fatigue\.crack\.initial = 5\.0: .* profiles, 3 mm"):
+        list(scene.path(scene.parameters(), [], lambda done: None))
 
 
 def test_a_crack_beyond_the_profiles_of_any_run_is_refused_when_the_study_is_read() -> None:

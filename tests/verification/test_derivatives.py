@@ -538,6 +538,14 @@ FOLLOW = TrackPasses.follow
 
 
 @pytest.mark.long
+def test_a_neighbour_that_fails_under_load_does_not_end_its_run() -> None:
+    scene = scene_named("elastic_punch")
+    parameters = scene.parameters(friction=0.02)
+    record = numbers(scene, parameters, ("friction",), ("peak_contact_pressure",))
+    assert record.message == "no derivative was found for d_peak_contact_pressure_d_friction"
+
+
+@pytest.mark.long
 @pytest.mark.parametrize(("accuracy", "error"), [("standard", 1e-5), ("fine", 1e-3)])
 def test_rounding_on_a_fine_mesh_leaves_derivatives_and_their_audit(
     accuracy: str, error: float
