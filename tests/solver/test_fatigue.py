@@ -503,7 +503,9 @@ def test_amplitudes_of_shear_are_radii_of_smallest_balls(count: int) -> None:
     stress = rng.normal(size=(300, count, 6)).repeat(2, axis=1)
     normal = rng.normal(size=(300, 3))
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    shear = acting(searching(Paths(stress), Findley(torsion=1.0, sensitivity=0.2).on_plane), normal).shear
+    shear = acting(
+        searching(Paths(stress), Findley(torsion=1.0, sensitivity=0.2).on_plane), normal
+    ).shear
     traction = stress[:, :, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] @ normal[:, None, :, None]
     along = traction[..., 0] - (traction[..., 0] @ normal[:, :, None]) * normal[:, None]
     _, radii = balls(np.ascontiguousarray(along.swapaxes(1, 2)))
