@@ -292,6 +292,12 @@ def one_element_aside(old: Any) -> Any:
     return aside
 
 
+def sampled_aside(patch: Patch) -> None:
+    """No run shares what is sampled, neither a right run's with this one nor the other way."""
+    instead(solver.fem.fields, "_locate", one_element_aside)(patch)
+    patch.setattr(solver.contact.system, "sampler", Sampler)
+
+
 def deeper(old: Any) -> Any:
     return lambda self, s, depth: old(self, s, 1.02 * depth)
 
@@ -537,9 +543,7 @@ MUTATIONS: dict[str, Mutation] = {
         load="contact",
     ),
     # places
-    "sampler one element aside": _pressed(
-        instead(solver.fem.fields, "_locate", one_element_aside), STORED
-    ),
+    "sampler one element aside": _pressed(sampled_aside, STORED),
     "depth scaled": _pressed(instead(Axis, "place", deeper), STORED),
     "shear of Mandel vectors": _pressed(
         instead(solver.results.fields, "to_tensor", shear_of_mandel), STORED
