@@ -12,14 +12,13 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from resource import RUSAGE_SELF, getrusage
 
 import numpy as np
 
 from solver import __version__
 from solver.linear import pardiso
 from solver.linear.solvers import chosen
-from tests.benchmarks.measure import Point
+from tests.benchmarks.measure import Point, peak_memory
 
 
 def conditions() -> list[str]:
@@ -92,7 +91,7 @@ def store(points: Sequence[Point], out: Path) -> None:
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "conditions": conditions(),
         "linear_solver": chosen("auto"),
-        "peak_memory": round(getrusage(RUSAGE_SELF).ru_maxrss / 1e3),
+        "peak_memory": round(peak_memory()),
         "points": series,
     }
     path.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")

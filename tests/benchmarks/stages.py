@@ -11,13 +11,12 @@ from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
-from resource import RUSAGE_SELF, getrusage
 from typing import Any
 from unittest import mock
 
 from solver.scenes import Scene
 from studies.scenes.registry import scene_named
-from tests.benchmarks.measure import Point
+from tests.benchmarks.measure import Point, peak_memory
 
 RUNS: Mapping[str, Mapping[str, Any]] = {
     "punch": {"load_ratio": 0.857, "friction": 0.3}, "ball": {"load_ratio": 3.0}, "shaft_hub": {},
@@ -73,6 +72,6 @@ def _stages(name: str, given: Mapping[str, Any]) -> tuple[int, dict[str, float]]
         "states": each[1] - spent["record"],
         "audit": spent["audit"],
         "results": spent["record"] - spent["audit"],
-        "peak_memory": getrusage(RUSAGE_SELF).ru_maxrss / 1e3,
+        "peak_memory": peak_memory(),
     }
     return int(found.scalars.get("degrees_of_freedom", 0)), values

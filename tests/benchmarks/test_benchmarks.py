@@ -83,6 +83,7 @@ def test_stages_of_a_run_add_up_to_its_time(tmp_path: Path) -> None:
     ((name, found),) = rows(tmp_path, "stages").items()
     assert name == "punch draft"
     assert min(found[stage] for stage in ("imports", "states", "audit", "results")) > 0
+    assert 50 < found["peak_memory"] < 1000
     assert rows(tmp_path, "hertz")
 
 
