@@ -19,6 +19,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 from functools import wraps
+from hashlib import sha256
 from types import FunctionType, ModuleType
 from typing import Any, ParamSpec, TypeVar
 
@@ -105,6 +106,15 @@ def kept(function: Callable[P, R]) -> Callable[P, R]:
         return remembered(key, lambda: function(*args, **kwargs))
 
     return known
+
+
+def digest_of(*arrays: np.ndarray) -> str:
+    """Return a hash of the content of arrays: a key of what is made of it."""
+    digest = sha256()
+    for array in arrays:
+        digest.update(repr((array.shape, array.dtype.str)).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def release(most: int | None = None) -> None:

@@ -157,13 +157,15 @@ class IncrementalFamily(Family):
         if any(_fineness(body.mesh) > _FINE for body in system.model.bodies):
             self._wider = dict.fromkeys(asked.by, _WIDEST)
         models = dict(zip(self.steps(run), map(scene.model, self.runs(run)), strict=True))
-        for name, model in models.items():
-            both = zip(system.model.bodies, model.bodies, strict=True)
+        moving = set[str]()
+        for name in models.keys() - self._wider.keys():
+            both = zip(system.model.bodies, models[name].bodies, strict=True)
             if not all(np.array_equal(one.mesh.p, two.mesh.p) for one, two in both):
-                self._wider.setdefault(name, WIDER)
+                moving.add(name)
+        self._wider |= dict.fromkeys(moving, WIDER)
         self._parameters = [run, *self.runs(run)]
         for name, parameters in zip(models, self._parameters[1:], strict=True):
-            if name in self._wider:  # its difference is wider
+            if name in moving:  # its difference is wider
                 models[name] = scene.model(parameters)
         systems = {name: System(model) for name, model in models.items()}
         self.followers = NeighbouringRuns(system, systems)

@@ -67,7 +67,7 @@ _STRAIGHT = 1e-14
 """Distance of instants from a line over the length of a path that is a part of it."""
 _FULL = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 """Components of a tensor as a matrix."""
-_AT_ONCE = 600
+_TOGETHER = 600
 """Number of points that are scanned together."""
 
 
@@ -129,8 +129,8 @@ def critical_planes(paths: Paths, search: Value, value: Value | None = None) -> 
     used = _used(paths.known, search) | _used(paths.known, value)
     used = used[: 1 + used[1:].any()]
     normal, values = np.empty((len(paths), 3)), np.zeros((used.size, len(paths)))
-    for k in range(0, len(paths), _AT_ONCE):
-        given = np.stack([own[k : k + _AT_ONCE] for own in paths.known[: len(used)]], axis=1)
+    for k in range(0, len(paths), _TOGETHER):
+        given = np.stack([own[k : k + _TOGETHER] for own in paths.known[: len(used)]], axis=1)
         ends = _ends(given, _STRAIGHT)
         straight = ends[:, 0] != ends[:, 1]
         short = np.take_along_axis(given[straight], ends[straight, None, :, None], axis=2)

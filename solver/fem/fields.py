@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from hashlib import sha256
-
 import numpy as np
 from scipy import sparse
 
@@ -12,7 +10,7 @@ from solver.fem.discretisation import Discretisation
 from solver.fem.nodes import Nodes
 from solver.fem.part import Part
 from solver.materials.state import Response
-from solver.memory import remembered
+from solver.memory import digest_of, remembered
 from solver.mesh.rounding import ROUNDED
 from solver.typing import Array, Ints
 
@@ -114,11 +112,8 @@ class Sampler:
 
 def sampler(part: Nodes, x: Array) -> Sampler:
     """Return the `Sampler` at positions x (2, n), which all runs on equal meshes share."""
-    digest = sha256(type(part.basis.elem).__name__.encode())
-    for array in (part.X, part.basis.element_dofs, x):
-        digest.update(str(array.shape).encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return remembered(digest.digest(), lambda: Sampler(part, x))
+    key = type(part.basis.elem), digest_of(part.X, part.basis.element_dofs, x)
+    return remembered(key, lambda: Sampler(part, x))
 
 
 def _locate(part: Nodes, x: Array) -> tuple[Ints, Ints, Array]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from hashlib import sha256
 
 import numpy as np
 from scipy import sparse
@@ -22,7 +21,7 @@ from solver.fem.nodes import Dofs
 from solver.fem.part import Part
 from solver.fem.surface import Surface
 from solver.linear.schur import Eliminated, SchurComplement
-from solver.memory import remembered
+from solver.memory import digest_of, remembered
 from solver.typing import Array, Ints
 
 
@@ -155,20 +154,14 @@ class Substructure(Part):
 
 
 def _key(part: Discretisation, kept: Ints, linear_solver: str) -> str:
-    """Return a hash of the content: equal bodies share their condensation."""
-    digest, body = sha256(), part.body
+    """Return a key of the content: equal bodies share their condensation."""
+    body = part.body
     elastic = body.law.stiffness(part.components)
-    for array in (body.mesh.doflocs, body.mesh.t, kept, elastic, part.condensable.fields):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    digest.update(
-        repr((
-            linear_solver, body.kinematics, body.element,
-            body.full_integration, body.thickness,
-            sorted((name, held, body.facets(name).tobytes())
-                   for name, held in body.supports.items()),
-        )).encode()
-    )  # fmt: skip
-    return digest.hexdigest()
+    arrays = digest_of(body.mesh.doflocs, body.mesh.t, kept, elastic, part.condensable.fields)
+    return arrays + repr((
+        linear_solver, body.kinematics, body.element, body.full_integration, body.thickness,
+        sorted((name, held, digest_of(body.facets(name))) for name, held in body.supports.items()),
+    ))  # fmt: skip
 
 
 def _condense(part: Discretisation, kept: Ints, linear_solver: str) -> _CondensedBody:

@@ -97,8 +97,9 @@ def _build(builder: Builder, scene: tables.SceneFile) -> None:
             if not any(each.field.startswith("results") for each in builder.mistakes):
                 builder.mistakes += _places_outside(system, scene)
             if scene.fatigue is not None and not builder.mistakes:
-                made = fatigue_of(scene.fatigue, view_of(scene))
-                builder.attempt("", lambda: made.before(None, system, view_of(scene)))
+                view = view_of(scene)
+                made = fatigue_of(scene.fatigue, view)
+                builder.attempt("", lambda: made.before(None, system, view))
 
 
 def _places_outside(system: System, scene: tables.SceneFile) -> Iterator[StudyError]:
