@@ -126,10 +126,15 @@ def programs() -> Iterator[Programs]:
 @pytest.fixture(scope="session")
 def lasting_worker() -> Iterator[Access]:
     """One worker for all tests that do not test the start and end of workers."""
+    from distributed import scheduler
+
     from studies import own_workers
 
-    with own_workers(1) as access:
-        yield access
+    with pytest.MonkeyPatch.context() as patch:
+        # While it waits, a sign of life each 0.5 s, as dask has it, would take 2 % of a core.
+        patch.setattr(scheduler, "heartbeat_interval", lambda workers: 5.0)
+        with own_workers(1) as access:
+            yield access
 
 
 @pytest.fixture(scope="module")

@@ -30,10 +30,12 @@ CONFIGURATION: Mapping[str, Any] = {
     "distributed.nanny.pre-spawn-environ": FROM_THE_START,
     # Every study has its own topic of events, and dask keeps the messages of each topic.
     "distributed.admin.low-level-log-length": 1,
-    # dask's pages are closed. Without the statistics for them processes that wait take a quarter of
-    # the time: by default each looks at itself 50 times a second, and a worker at its stack 100.
+    # dask's pages are closed. Without the statistics for them processes that wait take a tenth of
+    # the time: by default each looks at itself 50 times a second, a worker at its stack 100 times
+    # and at its memory 10.
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.memory.monitor-interval": "1s",
     "distributed.worker.profile.enabled": False,
 }
 """Settings of the scheduler and the workers started here."""

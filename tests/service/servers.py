@@ -46,6 +46,7 @@ def environment(log: Path) -> dict[str, str]:
         # Processes of dask that wait for minutes, as those of the package.
         "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
         "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "5s",
+        "DASK_DISTRIBUTED__WORKER__MEMORY__MONITOR_INTERVAL": "1s",
         "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     }
 
