@@ -11,6 +11,8 @@ Results store tensor components only; `component` computes an invariant when it 
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from solver.typing import Array
@@ -56,16 +58,30 @@ def identity(n_components: int) -> Array:
     return one
 
 
+@cache
+def projections(n_components: int) -> tuple[Array, Array]:
+    """Return what takes from a tensor three times its mean, and its deviator, read-only.
+
+    Both have the shape (n_components, n_components), on Mandel components.
+    """
+    one = identity(n_components)
+    mean = np.outer(one, one)
+    shape = np.eye(n_components) - mean / 3.0
+    for each in (mean, shape):
+        each.flags.writeable = False
+    return mean, shape
+
+
 def deviator(mandel: Array) -> Array:
     """Return the deviator (n_components, ...) of Mandel components of that shape."""
     out = np.array(mandel)
-    out[:3] -= mandel[:3].mean(axis=0)
+    out[:3] -= np.add.reduce(mandel[:3]) / 3  # for few points in half the time of `mean`
     return out
 
 
 def von_mises(mandel: Array) -> Array:
     """Return the von Mises stress (...) from Mandel components (n_components, ...) [MPa]."""
-    return np.asarray(np.sqrt(1.5 * (deviator(mandel) ** 2).sum(axis=0)))
+    return np.asarray(np.sqrt(1.5 * np.add.reduce(deviator(mandel) ** 2)))
 
 
 def principal(mandel: Array) -> tuple[Array, Array]:

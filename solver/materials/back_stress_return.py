@@ -14,7 +14,7 @@ from solver.materials.elasticity import Elasticity
 from solver.materials.radial_return import SQRT23
 from solver.materials.scalar import falling_root
 from solver.materials.state import PlasticState, Response
-from solver.tensors import deviator, identity, von_mises
+from solver.tensors import deviator, projections, von_mises
 from solver.typing import Array, Ints
 
 _ROUNDING = 8 * float(np.finfo(float).eps)
@@ -115,30 +115,33 @@ def fading_return(
     constants = [(rule.modulus, rule.recall) for rule in rules]
     C, gamma = np.reshape(constants, (-1, 2)).T[:, :, None]
 
-    def relative(growth: Array) -> tuple[Array, Array, Array]:
+    def at(growth: Array) -> tuple[Array, Array, Array, Array]:
         faded = np.exp(-gamma * growth)
         xi = s - (back * faded[:, None]).sum(axis=0)
         turn = (back * (gamma * faded)[:, None]).sum(axis=0)
-        return faded, xi, turn
+        q = von_mises(xi)
+        slope = 3 * G + (C * faded).sum(axis=0) + curve.slope(accumulated + growth)
+        return xi, turn, q, slope - 1.5 * (xi * turn).sum(axis=0) / q
 
     def excess(growth: Array) -> tuple[Array, Array]:
-        faded, xi, turn = relative(growth)
-        q, p = von_mises(xi), accumulated + growth
+        _, _, q, slope = at(growth)
         raised = sum(rule.in_tension(growth) for rule in rules)
-        slope = 3 * G + (C * faded).sum(axis=0) + curve.slope(p)
-        slope -= 1.5 * (xi * turn).sum(axis=0) / q
-        return q - curve.flow_stress(p) - 3 * G * growth - raised, -slope
+        return q - curve.flow_stress(accumulated + growth) - 3 * G * growth - raised, -slope
 
     nothing = np.zeros(s.shape[1])
-    first, _ = excess(nothing)
+    begun = excess(nothing)
+    first = begun[0]
     # after heating a back stress may exceed C / gamma: as it fades, the excess grows
     for X, (modulus, recall) in zip(back, constants, strict=True):
         if recall:
             first = first + np.maximum(von_mises(X) - modulus / recall, 0.0)
-    growth = falling_root(excess, nothing, first / (3 * G) * (1 + 1e-9), von_mises(s))
-    _, xi, turn = relative(growth)
+    growth = falling_root(
+        lambda x: begun if x is nothing else excess(x),
+        nothing, first / (3 * G) * (1 + 1e-9), von_mises(s),
+    )  # fmt: skip
+    xi, turn, _, slope = at(growth)
     size = np.sqrt((xi**2).sum(axis=0))
-    u, slope = xi / size, -excess(growth)[1]
+    u = xi / size
     normal = u / SQRT23
     pairs = zip(rules, back, strict=True)
     moved = [rule.evolve(X, growth, normal) for rule, X in pairs]
@@ -151,7 +154,7 @@ def fading_return(
         2
         * G
         * (
-            shrunk * (_projection(len(s))[:, :, None] - along + mixed / (SQRT23 * slope))
+            shrunk * (projections(len(s))[1][:, :, None] - along + mixed / (SQRT23 * slope))
             + 3 * G / slope * along
         )
     )
@@ -218,7 +221,7 @@ def general_return(
     by_s = _solved(end.slope(), np.repeat(np.eye(n + 1, n)[:, :, None], count, axis=2))
     turned = np.einsum("ijp,jkp->ikp", end.turning, by_s[:n])
     turned = end.normal[:, None] * by_s[n] + end.growth * turned
-    softening = 4 * G**2 * np.einsum("ijp,jk->ikp", turned, _projection(n))
+    softening = 4 * G**2 * np.einsum("ijp,jk->ikp", turned, projections(n)[1])
     return FlowStep(end.growth, end.growth * end.normal, end.moved(), softening)
 
 
@@ -271,8 +274,3 @@ def _solved(matrices: Array, right: Array) -> Array:
     """Return solutions (n, m, n_points) of systems (n, n, n_points) with m right-hand sides."""
     found = np.linalg.solve(np.moveaxis(matrices, -1, 0), np.moveaxis(right, -1, 0))
     return np.asarray(np.moveaxis(found, 0, -1), dtype=float)
-
-
-def _projection(n_components: int) -> Array:
-    one = identity(n_components)
-    return np.eye(n_components) - np.outer(one, one) / 3.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.parameters import Checked, Infinite, Modulus, Poisson
-from solver.tensors import identity
+from solver.tensors import projections
 from solver.typing import Array
 
 
@@ -46,9 +46,8 @@ class Elasticity(Checked):
 
     def stiffness(self, n_components: int) -> Array:
         """Return the stiffness (n_components, n_components) on Mandel strain [MPa]."""
-        one = identity(n_components)
-        deviator = np.eye(n_components) - np.outer(one, one) / 3.0
-        return self.bulk_modulus * np.outer(one, one) + 2 * self.shear_modulus * deviator
+        mean, deviator = projections(n_components)
+        return self.bulk_modulus * mean + 2 * self.shear_modulus * deviator
 
     def strain(self, stress: Array) -> Array:
         """Return the Mandel strain (n_components, ...) of Mandel stress of that shape [MPa]."""

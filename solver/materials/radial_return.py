@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.materials.elasticity import Elasticity
 from solver.materials.state import PlasticState, Response
-from solver.tensors import deviator, identity
+from solver.tensors import deviator, projections
 from solver.typing import Array
 
 SQRT23 = float(np.sqrt(2.0 / 3.0))
@@ -101,8 +101,7 @@ def radial_return(
     accumulated[at] += SQRT23 * dgamma
     stress[:, at] -= 2 * G * dgamma * n
 
-    one = identity(n_components)
-    projection = np.eye(n_components) - np.outer(one, one) / 3.0
+    projection = projections(n_components)[1]
     reduction = 2 * G * dgamma / size[at]
     theta_bar = 2 * G / (2 * G + 2 / 3 * H) - reduction
     tangent[:, :, at] -= (

@@ -37,8 +37,9 @@ def falling_root(
     found, least, last = x, np.full_like(high, np.inf), np.zeros_like(high)
     for _ in range(_MAX_ITERATIONS):
         off, slope = excess(x)
-        better = np.abs(off) < least
-        found, least = np.where(better, x, found), np.where(better, np.abs(off), least)
+        size = np.abs(off)
+        better = size < least
+        found, least = np.where(better, x, found), np.where(better, size, least)
         small = least <= _ROUNDING * scale
         if small.all():
             return found
@@ -46,7 +47,7 @@ def falling_root(
         step = x - off / slope
         inside = (step > low) & (step < high)
         if start is not None:
-            inside &= ~((off * last < 0) & (np.abs(off) > 0.5 * np.abs(last)))
+            inside &= ~((off * last < 0) & (size > 0.5 * np.abs(last)))
         x = np.where(inside, step, 0.5 * (low + high))
         x, last = np.where(small, found, x), off
     closed = high - low <= _ROUNDING * high
