@@ -7,7 +7,8 @@ numbers only.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from types import UnionType
 from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin
 
@@ -115,13 +116,12 @@ def _item(options: Options, k: int) -> Options:
     return found
 
 
-def _options(hint: Any, unit: str | None) -> Iterator[tuple[Any, str | None]]:
-    """Yield the types that a value may have, each with the unit of its numbers."""
+@cache
+def _options(hint: Any, unit: str | None) -> Options:
+    """Return the types that a value may have, each with the unit of its numbers."""
     if get_origin(hint) is Annotated:
         inner, *marks = get_args(hint)
-        yield from _options(inner, unit_in(marks, unit))
-    elif get_origin(hint) in (Union, UnionType):
-        for each in get_args(hint):
-            yield from _options(each, unit)
-    else:
-        yield hint, unit
+        return _options(inner, unit_in(marks, unit))
+    if get_origin(hint) in (Union, UnionType):
+        return tuple(option for each in get_args(hint) for option in _options(each, unit))
+    return ((hint, unit),)
