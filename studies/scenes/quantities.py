@@ -100,7 +100,8 @@ def _entry(options: Options, table: Mapping[str, Any], key: str) -> Options:
             fields = option.model_fields
             kinds = get_args(fields["kind"].annotation) if "kind" in fields else ()
             if key in fields and (not kinds or table.get("kind") in kinds):
-                found += _options(fields[key].annotation, option.unit_of(key, table))
+                hint: Any = fields[key].annotation
+                found += _options(hint, option.unit_of(key, table))
     return found
 
 
