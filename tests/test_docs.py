@@ -1,17 +1,18 @@
 """What the pages show works, as a reader would try it.
 
 The blocks of a page run from top to bottom in one empty directory that holds a copy of the studies
-and scene files of `data`; so do those of every page that has any. All studies but the tours are on
-the coarsest meshes, those of punches in few increments, and with the values that the pages look at.
-What an earlier page has computed by the same command is there already. ``python`` blocks are
-programs, each in a file and a process of its own, as workers import it; in ``console`` blocks each
-line ``$ residua …`` runs in this process, studies too, and must succeed. A ``text`` block after one
-of these shows what it prints: its lines are printed in this order, among others, with equal words,
-and with numbers that differ by at most `SHOWN`. The ``sh`` block of the first page is sent to a
-service. A ``toml`` block after ``<!-- file NAME.toml -->`` is written to that file. A block after
-``<!-- no-test -->`` is left out, which only those may be that need a server or compute for minutes.
-A block after ``<!-- from examples/NAME.py -->`` is not run: its lines stand in that script, which
-is. Links lead to files and headings that exist, and so do the files a page names.
+and scene files of `data`; so do those of every page that has any. Studies are on coarse meshes, in
+few increments, and with the values that the pages look at; only those of the first page, which
+shows numbers, are as they are. What an earlier page has computed by the same command is there
+already. ``python`` blocks are programs, each in a file and a process of its own, as workers import
+it; in ``console`` blocks each line ``$ residua …`` runs in this process, studies too, and must
+succeed. A ``text`` block after one of these shows what it prints: its lines are printed in this
+order, among others, with equal words, and with numbers that differ by at most `SHOWN`. The ``sh``
+block of the first page is sent to a service. A ``toml`` block after ``<!-- file NAME.toml -->`` is
+written to that file. A block after ``<!-- no-test -->`` is left out, which only those may be that
+need a server or compute for minutes. A block after ``<!-- from examples/NAME.py -->`` is not run:
+its lines stand in that script, which is. Links lead to files and headings that exist, and so do the
+files a page names.
 """
 
 from __future__ import annotations
@@ -62,7 +63,10 @@ PLACE = re.compile(r"`((?:\w+/)*\w+\.py)`: ((?:`[\w.]+`(?:, )?)+)")
 TICS = re.compile(r"\b(?:tells?|told|foreseen?|foresees?|in the place of|lets? expect)\b", re.I)
 """Words for report, show, state; predicted; instead of; predict."""
 RUN = re.compile(r"run \S+ --out (?P<out>\S+)")
+FIRST = Path("README.md")
 LESS = {
+    "tour.toml": {"smallest_element": 0.05, "growth": 3.0},
+    "tour-finer.toml": {"smallest_element": 0.04, "growth": 3.0},
     "ball.toml": {"load_ratio": [1.5, 6.0], "hardening": ["none", "kinematic"]},
     "ball-fit.toml": {"ranges": "{ yield_stress = [340, 420] }"},
     "elastic-punch.toml": {"friction": [0.0, 0.4]},
@@ -80,6 +84,11 @@ LESS = {
 }
 """Entries of studies with those of their values that the pages look at, and one more, or other
 ones for less work, a table as its text; None for lines that are left out."""
+COARSE = {
+    "punch": "load_step = 0.25\nunload_steps = 1\n",
+    "ball": "element_size = 0.2\ngrowth = 2.0\nload_step = 0.2\n",
+}
+"""Parameters of scenes besides the coarsest accuracy, where a study does not choose one."""
 TWO_SCREENS = 110
 """Lines of Markdown that the first page may have."""
 
@@ -131,16 +140,13 @@ def steps(page: list[Block], folder: Path) -> Iterator[tuple[Block, list[str] | 
             yield block, block.commands
 
 
-def carry_out(commands: list[str]) -> None:
-    """Run commands and their studies in this process: others would import for seconds.
-
-    Increments are divided only of the tour, whose numbers pages show.
-    """
+def carry_out(commands: list[str], divided: bool = False) -> None:
+    """Run commands and their studies in this process: others would import for seconds."""
     for command in commands:
         computes = command.startswith(("run ", "fit ")) and "--part" not in command
         alone = ["--workers", "0"] if computes else []
         with pytest.MonkeyPatch.context() as patch:
-            if "tour" not in command:
+            if not divided:
                 undivided(patch)
             assert main([*shlex.split(command), *alone]) == 0, f"$ residua {command}"
 
@@ -191,8 +197,8 @@ PAGES = [page for page in TEXTS if blocks((ROOT / page).read_text())]
 
 
 def test_the_first_page_is_run_and_fits_two_screens() -> None:
-    assert Path("README.md") in PAGES
-    text = (ROOT / "README.md").read_text()
+    assert FIRST in PAGES
+    text = (ROOT / FIRST).read_text()
     assert len(text.splitlines()) <= TWO_SCREENS
     assert len(LINK.findall(re.sub(r"!\[[^]]*\]\([^)]*\)", "", text))) <= 10
 
@@ -224,9 +230,10 @@ def coarse(study: str) -> str:
     """Return a study file with the coarsest accuracy, where it does not choose one."""
     if "accuracy" in study:
         return study
-    given = 'accuracy = "draft"\n'
-    if 'scene = "punch"' in study:
-        given += "load_step = 0.25\nunload_steps = 1\n"
+    scene = re.search(r'^scene = "(\w+)"', study, re.MULTILINE)
+    own = COARSE.get(scene[1], "") if scene else ""
+    lines = ['accuracy = "draft"', *own.splitlines()]
+    given = "".join(f"{line}\n" for line in lines if f"\n{line.partition(' ')[0]} =" not in study)
     head, table, rest = study.partition("[parameters]\n")
     if not table:
         head, table, rest = study.partition("[sweep]\n")
@@ -252,8 +259,8 @@ def results(page: list[Block]) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def computed() -> dict[str, Path]:
-    """Commands that compute a study, and the directories that they have written."""
+def computed() -> dict[tuple[bool, str], Path]:
+    """Directories that commands have written, by whether of the first page, and the command."""
     return {}
 
 
@@ -262,7 +269,7 @@ def computed() -> dict[str, Path]:
 def test_blocks_of_a_page_run(
     page: Path,
     tmp_path: Path,
-    computed: dict[str, Path],
+    computed: dict[tuple[bool, str], Path],
     programs: Programs,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -270,38 +277,36 @@ def test_blocks_of_a_page_run(
     monkeypatch.chdir(tmp_path)
     for folder in ("studies", "scenes"):
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
-    for study in (tmp_path / "data" / "studies").glob("*.toml"):
-        if not study.name.startswith("tour"):  # their pages show what they compute
-            study.write_text(coarse(study.read_text()))
-    for name, entries in LESS.items():
-        study = tmp_path / "data" / "studies" / name
-        study.write_text(shortened(study.read_text(), entries))
+    first = page == FIRST
+    for study in () if first else (tmp_path / "data" / "studies").glob("*.toml"):
+        changed = shortened(study.read_text(), LESS.get(study.name, {}))
+        study.write_text(coarse(changed))
     found = blocks((ROOT / page).read_text())
     for command, out in results(found).items():
-        if command in computed:
-            shutil.copytree(computed[command], tmp_path / out)
+        if (first, command) in computed:
+            shutil.copytree(computed[first, command], tmp_path / out)
     for block, program in steps(found, tmp_path):
         capsys.readouterr()
         print(f"{page}:{block.line}")  # shown where it fails
         if isinstance(program, Path):
             print(run_python(program, programs))
         else:
-            carry_out(program)
+            carry_out(program, divided=first)
         printed = capsys.readouterr().out
         assert not not_printed(block.shown, printed), printed
-    computed |= {command: tmp_path / out for command, out in results(found).items()}
+    computed |= {(first, command): tmp_path / out for command, out in results(found).items()}
 
 
 @pytest.mark.pages
 def test_the_requests_of_the_first_page_are_answered_as_it_shows(
-    tmp_path: Path, computed: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, computed: dict[tuple[bool, str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if TOUR not in computed:
+    if (True, TOUR) not in computed:
         monkeypatch.chdir(ROOT)
-        carry_out([TOUR.replace("--out tour", f"--out {tmp_path / 'tour'}")])
-        computed[TOUR] = tmp_path / "tour"
+        carry_out([TOUR.replace("--out tour", f"--out {tmp_path / 'tour'}")], divided=True)
+        computed[True, TOUR] = tmp_path / "tour"
     (sent,) = (b for b in blocks((ROOT / "README.md").read_text()) if b.language == "sh")
-    shutil.copytree(computed[TOUR], tmp_path / "service" / "data")
+    shutil.copytree(computed[True, TOUR], tmp_path / "service" / "data")
     server = Server(tmp_path / "service").start()
     try:
         requests = sent.text.replace("localhost:8000", f"localhost:{server.port}")
