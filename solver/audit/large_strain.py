@@ -84,9 +84,10 @@ def large_strain(
 ) -> Neglected:
     """Return the largest estimate of a body in the states of a path.
 
-    Bodies of large strain neglect nothing; next to others they respond as their elastic stiffness.
+    Elements of large strain neglect nothing. Bodies of which all have it respond, next to others,
+    as their elastic stiffness.
     """
-    if all(body.body.large for body in plain):
+    if all(body.body.large_elements.all() for body in plain):
         return Neglected()
     found = Neglected()
     bodies: Sequence[_Deformed | None] = [None] * len(plain)
@@ -186,12 +187,13 @@ class _Deformed:
         counts = plain.remaining(state.time) > GHOST
         for point in system.model.singular:
             counts &= ~point.reaches(plain.points)
-        counts &= not plain.body.large
+        large = plain.body.large_elements
+        counts &= ~np.repeat(large, plain.volume.shape[1])
         self.volume = np.where(counts, plain.volume.ravel(), 0.0)
         self.added: Array = np.zeros_like(self.stress) if before is None else before.added
         self.most: float = max(self.energy(self.stress), 0.0 if before is None else before.most)
         self.tangent: PartResponse | None = None
-        if plain.body.large:
+        if large.all():
             self.force = np.zeros(self.part.n)
             self.nominal = self.strain = self.since = np.zeros_like(self.stress)
             return
@@ -202,10 +204,13 @@ class _Deformed:
         e = _mandel((H + H.swapaxes(0, 1)) / 2, hoop)
         change = _nominal(T, e)
         R = turning(np.arctan2(H[1, 0] - H[0, 1], 2 + H[0, 0] + H[1, 1]))
+        change[:, large] = 0.0
         turned = _product(R, _matrix(T + change)[:2, :2]) - _matrix(T)[:2, :2]
+        turned[:, :, large] = 0.0
         self.force = plain.nominal_forces(turned, change[2]).ravel()
         for load in following(self.part):
-            self.force -= load.change(u, state.time)
+            if not plain.body.deformed(load.load):
+                self.force -= load.change(u, state.time)
         self.nominal = change.reshape(4, -1)
         change = _mandel(_logarithm(H), np.log(np.maximum(1 + hoop, _FLAT))) - e
         self.strain = np.where(counts, plain.level(change).reshape(4, -1), 0.0)

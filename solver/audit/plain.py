@@ -130,11 +130,13 @@ class PlainBody:
     def strain(self, u: Array) -> Array:
         """Return Mandel strain (n_components, n_elements, n_points) for displacements (n,) [mm]."""
         H, hoop = self.gradient(u)
-        if self.body.large:
-            return self.level(logarithmic(H, hoop))
         normal = [*(H[axis, axis] for axis in range(len(H))), hoop][:3]
         shears = [(H[a, b] + H[b, a]) / SQRT2 for a, b in _SHEARS[: 2 * len(H) - 3]]
-        return self.level(np.array([*normal, *shears]))
+        strain = np.array([*normal, *shears])
+        if self.body.large:
+            large = self.body.large_elements
+            strain[:, large] = logarithmic(H[:, :, large], hoop[large])
+        return self.level(strain)
 
     @cached_property
     def points(self) -> Array:
@@ -211,10 +213,14 @@ class PlainBody:
         are needed then.
         """
         each = self.level(to_tensor(stress).reshape(len(stress), *self.volume.shape))
-        if self.body.large and u is not None:
-            return self.nominal_forces(*nominal(each, *self.gradient(u)))
         dim = len(each) // 2
-        return self.nominal_forces(each[_COMPONENT[:dim, :dim]], each[2])
+        plane, hoop = each[_COMPONENT[:dim, :dim]], each[2].copy()
+        if self.body.large and u is not None:
+            large, (H, around) = self.body.large_elements, self.gradient(u)
+            plane[:, :, large], hoop[large] = nominal(
+                each[:, large], H[:, :, large], around[large]
+            )
+        return self.nominal_forces(plane, hoop)
 
     def nominal_forces(self, stress: Array, hoop: Array) -> Array:
         """Return the nodal forces (n_nodes, dim) that balance a nominal stress [N].
@@ -243,7 +249,7 @@ class PlainBody:
         total = np.zeros((1 + self.part.dim, self.part.dim))
         for load, own in zip(self.body.every_load, self._on_body, strict=True):
             at_factor_one = own
-            if self.body.large and load.follows and u is not None:
+            if self.body.deformed(load) and u is not None:
                 x = self.part.X + vectors(u, self.part.dim)
                 each = [self._on_boundary(load.push, b, x) for b in load.boundaries]
                 at_factor_one = np.sum(each, axis=0)

@@ -89,10 +89,13 @@ def accumulated_strain(system: System, converged: Converged) -> float:
 
 
 def plastic_strain(system: System, states: Iterable[Converged]) -> Strained:
-    """Return the largest equivalent plastic strain (of the tensor) of bodies of small strain."""
+    """Return the largest equivalent plastic strain (of the tensor) where strain is small."""
     each = (body for converged in states for body in _yielding(system, converged.state))
-    small = {body.name for body in system.model.bodies if not body.large}
-    bodies = ((name, X, equivalent(plastic)) for name, X, plastic in each if name in small)
+    bodies = []
+    for name, X, plastic in each:
+        large = system.full(name).body.large_elements
+        strain = equivalent(plastic).reshape(len(large), -1)
+        bodies.append((name, X, np.where(large[:, None], 0.0, strain).ravel()))
     return largest_strain(bodies, system.model.singular)
 
 

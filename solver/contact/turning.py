@@ -103,9 +103,11 @@ def _on_parts(
     for side, own in enumerate((numbers[:cut], numbers[cut:] - first)):
         number, part, surface = interface.sides[side]
         here = slice(0, cut) if side == 0 else slice(cut, None)
-        dofs, pull = surface.dofs[own], None
+        dofs, pull = part.numbered(surface.dofs[own]), None
         if isinstance(part, RigidPart):
             dofs, pull = part.pull_back(surface, u[number], np.eye(surface.X.size)[own], 0)
+        elif (dofs < 0).any():
+            dofs, pull = dofs[dofs >= 0], np.eye(len(dofs))[:, dofs >= 0]
         every.append(ends[number] + dofs)
         pulls.append((here, pull))
     for _ in ("forces", "displacements"):

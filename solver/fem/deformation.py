@@ -12,7 +12,7 @@ three dimensions sqrt(2) yz and sqrt(2) zx.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -42,8 +42,17 @@ class Deformation:
     strain: Array
     B: Array
     weights: Array
-    linear: ClassVar[bool] = True
-    """Whether strain is linear in displacements."""
+
+    @property
+    def linear(self) -> Bools:
+        """Whether strain is linear in displacements, at all points () or at each (n_points,)."""
+        return np.True_
+
+    def within(self, elements: Bools, dofs: Ints, n: int) -> Deformation:
+        """Return some elements (n_elements,) before loading; ``dofs`` are theirs, of n unknowns."""
+        B, weights = self.B[elements], self.weights[elements]
+        at_rest = np.zeros((B.shape[2], weights.size))
+        return Deformation(n=n, dofs=dofs, strain=at_rest, B=B, weights=weights)
 
     @property
     def _flat(self) -> Array:

@@ -91,10 +91,7 @@ class Discretisation(Nodes, Part):
         mean : whether the volumetric strain is the mean over each element
         """
         B = strain_operator(values, gradients, self.points[0], self.body.kinematics)
-        return self._small_strain(mean_dilatation(B, self.weights) if mean else B)
-
-    def _small_strain(self, B: Array) -> Deformation:
-        """Return the body before loading for small strain, with the operator B of the elements."""
+        B = mean_dilatation(B, self.weights) if mean else B
         at_rest = np.zeros((self.components, self.weights.size))
         return Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
 
@@ -163,7 +160,13 @@ class Discretisation(Nodes, Part):
         return PartResponse(self._stressed(deformation.strain, state, time), deformation, (u, time))
 
     def _stressed(self, strain: Array, state: PlasticState, time: float) -> Response:
-        """Return the response of the law to the strain (n_components, n_points)."""
+        """Return the response of the law; stress is NaN where the material is inverted.
+
+        ``strain`` (n_components, n_points) is NaN there.
+        """
+        if self.body.large and (inverted := np.isnan(strain).any(axis=0)).any():
+            found = self._stressed(np.where(inverted, 0.0, strain), state, time)
+            return found._replace(stress=np.where(inverted, np.nan, found.stress))
         if self.eigenstrains.cases:
             strain = strain - self.eigenstrain(time)
         response = self.law(time).respond(strain, state)
@@ -284,18 +287,19 @@ class Discretisation(Nodes, Part):
     def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
         """Return the values of ``(1 - blend) tangent + blend elastic stiffness`` on `pattern`.
 
-        Elements whose points are all linear keep their elastic matrix.
+        Elements whose points are all linear keep their elastic matrix. A geometric term is whole.
         """
-        data = self._tangent_data(response)
-        return (1 - blend) * data + blend * self.elastic_data if blend else data
-
-    def _tangent_data(self, response: PartResponse) -> Array:
         law, deformation, shape = response.law, response.deformation, self.weights.shape
         elements = np.flatnonzero(~response.linear.reshape(shape).all(axis=1))
         if len(elements) == 0:
             return self.elastic_data
         tangent = law.tangent.reshape(*law.tangent.shape[:2], *shape)
         tangent = tangent[:, :, elements].transpose(2, 3, 0, 1)
+        curved = blend and not deformation.linear.all()
+        if curved:
+            C = self.body.law.stiffness(self.components)
+            tangent = (1 - blend) * tangent + blend * C
         now = deformation.stiffness(elements, tangent, law.stress)
         change = now - self.elastic_elements[elements]
-        return self.elastic_data + self._assembly.values(elements, change)
+        data = self.elastic_data + self._assembly.values(elements, change)
+        return (1 - blend) * data + blend * self.elastic_data if blend and not curved else data

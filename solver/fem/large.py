@@ -1,7 +1,9 @@
 """A body of large strain: logarithmic strain, and pressures that follow its boundary.
 
-Its nodes, points, law and contact are those of a body of small strain. No element keeps the
-stiffness of the undeformed body, so that the elastic stiffness is also that at the displacements.
+Its nodes, points, law and contact are those of a body of small strain. No element of large strain
+keeps the stiffness of the undeformed body. If only the elements of a region have large strain, the
+others are linear where they do not flow, so that increments are solved in windows around the region
+(`solver.fem.window`).
 """
 
 from __future__ import annotations
@@ -13,10 +15,9 @@ import numpy as np
 
 from solver.fem.deformation import Deformation, PartResponse
 from solver.fem.discretisation import Discretisation
-from solver.fem.log_strain import LogDeformation, gradient_operator
+from solver.fem.log_strain import LogDeformation, RegionDeformation, gradient_operator
 from solver.fem.nodes import Dofs, vectors
 from solver.fem.surface import edges_of
-from solver.materials import PlasticState, Response
 from solver.mesh.edges import shape_derivatives, shape_functions
 from solver.model.loads import Load
 from solver.typing import Array
@@ -97,7 +98,7 @@ class Follower:
 
 
 def following(part: Discretisation) -> list[Follower]:
-    """Return the loads that follow the boundaries of a body if its strain is large."""
+    """Return the loads that follow boundaries where strain is large."""
     loads = [load for load in part.body.every_load if load.follows and not load.moves]
     return [Follower(part, load, boundary) for load in loads for boundary in load.boundaries]
 
@@ -110,12 +111,25 @@ class LargeDiscretisation(Discretisation):
 
     @cached_property
     def _following(self) -> list[Follower]:
-        return following(self)
+        return [each for each in following(self) if self.body.deformed(each.load)]
 
     def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Deformation:
-        g = gradient_operator(values, gradients, self.points[0], self.body.kinematics)
-        at_rest = np.zeros(self.n)
-        return LogDeformation.of(self.n, self.dofs, g, self.weights, at_rest, mean=mean)
+        large, at_rest = self.body.large_elements, np.zeros(self.n)
+        g = gradient_operator(
+            values[:, large], gradients[:, :, large], self.points[0][large], self.body.kinematics
+        )
+        log = LogDeformation.of(
+            self.n, self.dofs[large], g, self.weights[large], at_rest, mean=mean
+        )
+        if large.all():
+            return log
+        small = super()._measure(values, gradients, mean=mean)
+        return RegionDeformation.joined(small, log, np.flatnonzero(large), at_rest)
+
+    @property
+    def narrows(self) -> bool:
+        """See `Part`."""
+        return not (self._following or self.body.large_elements.all())
 
     def external(self, time: float, u: Array | None = None) -> Array:
         """Return the external nodal forces (n,) at a time and displacements (n,) [N]."""
@@ -125,19 +139,16 @@ class LargeDiscretisation(Discretisation):
                 force = force + each.change(u, time)
         return force
 
-    def _stressed(self, strain: Array, state: PlasticState, time: float) -> Response:
-        """Return the response of the law; stress is NaN where the material is inverted."""
-        inverted = np.isnan(strain).any(axis=0)
-        if not inverted.any():
-            return super()._stressed(strain, state, time)
-        found = super()._stressed(np.where(inverted, 0.0, strain), state, time)
-        return found._replace(stress=np.where(inverted, np.nan, found.stress))
-
     def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
-        """Return the values of the consistent tangent on `pattern`.
-
-        The share ``blend`` of the moduli is elastic; the geometric term is whole.
-        """
+        """See `Discretisation`; pressures that follow are whole, too."""
+        if not self.body.large_elements.all():
+            data = super().tangent_data(response, blend)
+            if not self._following:
+                return data
+            K = np.zeros_like(self.elastic_elements)
+            for each in self._following:
+                each.add_stiffness(K, *response.place)
+            return data + self._assembly.values(slice(None), K)
         law, deformation, shape = response.law, response.deformation, self.weights.shape
         D = law.tangent
         if blend:
@@ -154,7 +165,7 @@ class LargeDiscretisation(Discretisation):
         Its shape is the smallest triangle at a corner over the square of the longest side, as a
         share of that before loading.
         """
-        corners = self.body.mesh.t
+        corners = self.body.mesh.t[:, self.body.large_elements]
         each = [_shapes(x[:, corners]) for x in (self.X, self.X + vectors(u, self.dim))]
         share = each[1] / each[0]
         worst = int(share.argmin())
@@ -175,7 +186,8 @@ class LargeDiscretisation(Discretisation):
         body that is held somewhere are those before loading: supports fix points of it, about which
         it cannot be said to turn.
         """
-        if self._held.any() or self.rigid.shape[1] < 2 or not np.isfinite(u).all():
+        part = not self.body.large_elements.all()  # the rest of the body cannot turn
+        if part or self._held.any() or self.rigid.shape[1] < 2 or not np.isfinite(u).all():
             return self
         here, x = copy(self), self.X + vectors(u, self.dim)
         here.rigid = self._motions(x)
@@ -184,7 +196,7 @@ class LargeDiscretisation(Discretisation):
 
     def turned_forces(self, time: float, contact: Array) -> Array | None:
         """See `Part`: forces within the body turn with it, and so do loads that follow it."""
-        if self.rigid.shape[1] < 3:
+        if self.rigid.shape[1] < 3 or not self.body.large_elements.all():
             return None
         forces = self.external(time) + contact
         for each in self._following:

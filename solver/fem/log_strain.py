@@ -23,13 +23,13 @@ C. Miehe, N. Apel, M. Lambrecht, Comput. Methods Appl. Mech. Engrg 191 (2002) 53
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
 from solver.fem.deformation import Deformation, Some, mean_dilatation
 from solver.tensors import SQRT2
-from solver.typing import Array, Ints
+from solver.typing import Array, Bools, Ints
 
 _NEAR, _TERMS = 0.05, 15
 """Ratio q up to which h is a power series, with this number of terms; principal strains differ by
@@ -168,7 +168,11 @@ class LogDeformation(Deformation):
     gradients: Array
     stretch: _Stretch
     mean: bool
-    linear: ClassVar[bool] = False
+
+    @property
+    def linear(self) -> Bools:
+        """See `Deformation`."""
+        return np.False_
 
     @classmethod
     def of(
@@ -190,6 +194,11 @@ class LogDeformation(Deformation):
             n=n, dofs=dofs, strain=E.reshape(4, -1), B=B, weights=weights, gradients=gradients,
             stretch=stretch, mean=mean,
         )  # fmt: skip
+
+    def within(self, elements: Bools, dofs: Ints, n: int) -> LogDeformation:
+        """See `Deformation`."""
+        g, weights = self.gradients[elements], self.weights[elements]
+        return self.of(n, dofs, g, weights, np.zeros(n), mean=self.mean)
 
     def at(self, u: Array) -> Self:
         """See `Deformation`."""
@@ -221,14 +230,15 @@ class LogDeformation(Deformation):
     def stiffness(self, elements: Some, tangent: Array, stress: Array | None = None) -> Array:
         """See `Deformation`; the geometric term needs ``stress``."""
         stiffness = Deformation.stiffness(self, elements, tangent)
-        if stress is None:
-            return stiffness
+        return stiffness if stress is None else stiffness + self.geometric(elements, stress)
+
+    def geometric(self, elements: Some, stress: Array) -> Array:
+        """Return the geometric term (k, m, m) of the stiffness of some elements [N/mm]."""
         g = self.gradients[elements]
         K = np.moveaxis(self._geometric(stress)[:, :, elements], (0, 1), (2, 3))[..., : g.shape[2]]
         K = K[:, :, : g.shape[2]] * self.weights[elements][:, :, None, None]
         flat = g.reshape(len(g), -1, g.shape[-1])
-        added = np.matmul(flat.swapaxes(1, 2), np.matmul(K, g).reshape(flat.shape))
-        return np.asarray(stiffness + added)
+        return np.asarray(np.matmul(flat.swapaxes(1, 2), np.matmul(K, g).reshape(flat.shape)))
 
     def geometric_energy(self, step: Array, stress: Array) -> float:
         """See `Deformation`."""
@@ -240,6 +250,80 @@ class LogDeformation(Deformation):
         """See `Deformation`."""
         own = self.stretch.hoop * np.exp(across.reshape(self.weights.shape))
         return self.stretch.cauchy(self._conjugate(stress), own).reshape(4, -1)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RegionDeformation(Deformation):
+    """A body at its displacements, with logarithmic strain in a region and small strain elsewhere.
+
+    Attributes
+    ----------
+    small : all elements with small strain, before loading
+    log : the elements of the region, at the displacements
+    region : (k,) their numbers
+    """
+
+    small: Deformation
+    log: LogDeformation
+    region: Ints
+
+    @classmethod
+    def joined(cls, small: Deformation, log: LogDeformation, region: Ints, u: Array) -> Self:
+        """Return a body at displacements u (n,), given its parts; those may be at others."""
+        log, B = log.at(u), small.B.copy()
+        B[region] = log.B
+        strain = small.change(u)
+        strain.reshape(len(strain), *small.weights.shape)[:, region] = log.strain.reshape(
+            len(strain), *log.weights.shape
+        )
+        return cls(
+            n=small.n, dofs=small.dofs, strain=strain, B=B, weights=small.weights,
+            small=small, log=log, region=region,
+        )  # fmt: skip
+
+    @property
+    def linear(self) -> Bools:
+        """See `Deformation`."""
+        linear = np.ones(self.weights.shape, dtype=bool)
+        linear[self.region] = False
+        return linear.ravel()
+
+    def within(self, elements: Bools, dofs: Ints, n: int) -> RegionDeformation:
+        """See `Deformation`; the elements contain the region."""
+        number = np.cumsum(elements) - 1
+        region, every = number[self.region], np.ones(len(self.region), dtype=bool)
+        log = self.log.within(every, dofs[region], n)
+        return self.joined(self.small.within(elements, dofs, n), log, region, np.zeros(n))
+
+    def at(self, u: Array) -> Self:
+        """See `Deformation`."""
+        return self.joined(self.small, self.log, self.region, u)
+
+    def _inside(self, stress: Array) -> Array:
+        """Return the values of points (c, n_points) in the region, flat."""
+        each = stress.reshape(len(stress), *self.weights.shape)[:, self.region]
+        return np.asarray(each.reshape(len(stress), -1))
+
+    def stiffness(self, elements: Some, tangent: Array, stress: Array | None = None) -> Array:
+        """See `Deformation`; the geometric term needs ``stress``."""
+        stiffness = Deformation.stiffness(self, elements, tangent)
+        if stress is not None:
+            number = np.full(len(self.B), -1)
+            number[self.region] = np.arange(len(self.region))
+            inside = (own := number[elements]) >= 0
+            stiffness[inside] += self.log.geometric(own[inside], self._inside(stress))
+        return stiffness
+
+    def geometric_energy(self, step: Array, stress: Array) -> float:
+        """See `Deformation`."""
+        return self.log.geometric_energy(step, self._inside(stress))
+
+    def cauchy(self, stress: Array, across: Array) -> Array:
+        """See `Deformation`."""
+        true, shape = stress.copy(), (len(stress), *self.weights.shape)
+        own = self.log.cauchy(self._inside(stress), self._inside(across[None])[0])
+        true.reshape(shape)[:, self.region] = own.reshape(len(own), *self.log.weights.shape)
+        return true
 
 
 def _at_points(gradients: Array, u: Array) -> Array:

@@ -131,7 +131,7 @@ class Assembled(Operators):
 
     def tangent(self, response: PartResponse, blend: float) -> Operator:
         """Return the operator of ``(1 - blend) tangent + blend elastic stiffness``."""
-        if response.deformation.linear and (blend >= 1 or response.linear.all()):
+        if response.linear.all() or (blend >= 1 and response.deformation.linear.all()):
             return self.elastic
         return Factored(self._analysed, self._part.tangent_data(response, blend))
 

@@ -123,6 +123,11 @@ class Part(ABC):
         """Volume of the points (n_points,) [mm3]; a part without points has none."""
         return np.zeros(0)
 
+    @property
+    def narrows(self) -> bool:
+        """Whether it can be solved in a window, outside of which it is linear."""
+        return True
+
     def start(self) -> Array:
         """Return the unknowns (n,) before any load."""
         return np.zeros(self.n)
@@ -162,6 +167,10 @@ class Part(ABC):
     def motion(self, surface: Surface, u: Array) -> Array:
         """Return the displacements (2, n_nodes) of a surface's nodes [mm]."""
         return vectors(u[surface.dofs], len(surface.X))
+
+    def numbered(self, dofs: Ints) -> Ints:
+        """Return the numbers here of unknowns on contact surfaces; -1 for those left out."""
+        return dofs
 
     def pull_back(self, surface: Surface, u: Array, block: Array, gaps: int) -> tuple[Ints, Array]:
         """Return unknowns (m,) of this part and derivative rows (n_rows, m) on these.

@@ -48,7 +48,7 @@ class Region:
     def around(
         cls, whole: Discretisation, surfaces: Sequence[Surface], inner: Region, layers: int
     ) -> Region:
-        """Return the region ``inner`` extended by layers of elements.
+        """Return the region ``inner`` extended by layers of elements, with those of large strain.
 
         Without yielding elements it is extended from the touching ones.
         """
@@ -59,7 +59,7 @@ class Region:
         for surface in surfaces:
             contact[surface.dofs] = near[surface.dofs]
         yields = inner.elements if inner.elements.any() else touched
-        return cls(_layered(whole, yields, layers), contact)
+        return cls(_layered(whole, yields, layers) | whole.body.large_elements, contact)
 
     def has(self, other: Region) -> bool:
         """Whether it contains another region."""
@@ -122,7 +122,7 @@ class Windowed(Discretisation):
         """Set the elements of the window, and the quantities at their points."""
         self.dofs = number[whole.dofs[self.elements]]
         self.weights = whole.weights[self.elements]
-        self.undeformed = self._small_strain(whole.undeformed.B[self.elements])
+        self.undeformed = whole.undeformed.within(self.elements, self.dofs, self.n)
         self.points = whole.points[:, self.elements]
         per_element = whole.weights.shape[1]
         elements = np.repeat(np.flatnonzero(self.elements), per_element)
@@ -153,7 +153,8 @@ class Windowed(Discretisation):
         here = copy(self)
         response = self.whole.respond(u, plastic, time)
         out = self.whole.residual(time, u, response)
-        out[self.kept] += self.undeformed.internal_force(response.law.stress[:, self.inside])
+        inner = self.undeformed.at(u[self.kept])
+        out[self.kept] += inner.internal_force(response.law.stress[:, self.inside])
         here._outer, here._begin = self._schur.begin(out), u
         return here
 
@@ -166,6 +167,11 @@ class Windowed(Discretisation):
         """Return its inverse stiffnesses, given the elastic operator of the whole body."""
         restricted = Restricted(elastic, self.kept, self.whole.n)
         return Assembled(self, np.flatnonzero(self._touches), linear_solver, restricted)
+
+    def numbered(self, dofs: Ints) -> Ints:
+        """See `Part`; contact acts in the region only."""
+        at = self._number[dofs]
+        return np.where((at >= 0) & self._touches[at], at, -1)
 
     def over_whole(self, operator: Operator) -> Operator:
         """Return the operator of the whole body, given that of the window."""

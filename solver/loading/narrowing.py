@@ -53,7 +53,7 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if windows are unsuitable: there are links, a body has large strain (it is linear nowhere),
+    None if windows are unsuitable: there are links, a body is linear nowhere, or pressures follow it,
     nothing yields, windows would be large or grow too often, a body loses its contacts, or the
     whole bodies are not in balance. Raises `FailedInWindows` if the increment fails in them.
 
@@ -62,7 +62,7 @@ def narrowed(
     before : the last increment, which ended at ``start``
     guess : predicted state, if any
     """
-    if len(system.links) or system.model.large:
+    if len(system.links) or not all(part.narrows for part in system.parts):
         return None
     windows = before.windows or (None,) * len(system.parts)
     begin, count = system.moved(start, time), np.zeros(3, dtype=int)
@@ -72,7 +72,8 @@ def narrowed(
     own, had = [response.law for response in responses], before.responses
     both = zip(_yields(system, own), _yields(system, had), strict=True)
     yields: Yields = [now if now is None or was is None else now | was for now, was in both]
-    if not before.windows and not any(own is not None and own.any() for own in yields):
+    curved = system.model.large
+    if not (before.windows or curved or any(own is not None and own.any() for own in yields)):
         return None
     touched: Candidates | None = None  # unknown until contact leaves the windows (`Singular`)
     needed = _needed(system, touched, yields)

@@ -56,6 +56,8 @@ class Body:
     condense : whether to reduce the body to its contact surfaces if its material is elastic
     axle : makes an elastic body a wheel, which its supports connect to the hub
     strain : ``small``, or ``large``: logarithmic strain and equilibrium in the deformed body
+    large_region : name of the region of the mesh that alone has large strain; with windows around
+        it the cost is near that of small strain. By default the whole body
     cracks : names of the cracks of the mesh (`solver.mesh.opened`), whose faces lie on one another
     """
 
@@ -73,6 +75,7 @@ class Body:
     condense: bool = True
     axle: Axle | None = None
     strain: Literal["small", "large"] = "small"
+    large_region: str = ""
     cracks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -113,6 +116,9 @@ class Body:
             raise ModelError("axle", self.name, "a wheel must be elastic: leave out yield_stress")
         if self.large:
             self._check_large()
+        elif self.large_region:
+            allowed = f'must be left out: the strain of body {self.name!r} is "small"'
+            raise ModelError("large_region", self.large_region, allowed)
         for load in self.every_load if self.axle is not None else ():
             raise ModelError(load.name, load.boundaries, "must not be given on a body with an axle")
 
@@ -120,6 +126,20 @@ class Body:
     def large(self) -> bool:
         """Whether its strain is large."""
         return self.strain == "large"
+
+    @cached_property
+    def large_elements(self) -> np.ndarray:
+        """Which elements (n_elements,) have large strain."""
+        large = np.full(self.mesh.nelements, self.large)
+        if self.large_region:
+            large[:] = False
+            large[self.region(self.large_region, "large_region")] = True
+        return large
+
+    def deformed(self, load: Load) -> bool:
+        """Whether a load follows boundaries whose strain is large."""
+        facets = [self.facets(boundary) for boundary in load.boundaries if load.follows]
+        return any(self.large_elements[self.mesh.f2t[0, own]].any() for own in facets)
 
     @property
     def of_small_strain(self) -> list[str]:
@@ -136,6 +156,12 @@ class Body:
         for name in self.of_small_strain:
             allowed = f'must be left out of body {self.name!r}, or its strain must be "small"'
             raise ModelError(name, "given with large strain", allowed)
+        for load in self.every_load if self.large_region else ():
+            facets = [self.facets(boundary) for boundary in load.boundaries]
+            inside = self.large_elements[self.mesh.f2t[0, np.concatenate(facets)]]
+            if self.deformed(load) and not inside.all():
+                allowed = f"must push inside or outside of region {self.large_region!r}, not both"
+                raise ModelError(load.name, load.boundaries, allowed)
 
     def _check_cracked(self) -> None:
         """Refuse what bodies with cracks do not have."""

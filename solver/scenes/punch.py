@@ -85,10 +85,10 @@ class PunchParameters(ContactParameters):
     element: Literal["quad8", "quad9", "quad4", "tri6", "tri3"] = described(
         "quad8", "element of both bodies"
     )
-    strain: Literal["small", "large"] = described(
+    strain: Literal["small", "large", "region"] = described(
         "small",
         "strain of both bodies: large strain is logarithmic, and forces balance in the deformed "
-        "bodies",
+        "bodies; region has it near the corner of the punch alone",
     )
     load_step: Annotated[float, Interval(ge=1e-4, le=1.0), Unit("1")] = by_accuracy(
         "largest increment of load_ratio"

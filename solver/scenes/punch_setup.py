@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from skfem import Mesh
 
 from solver.fem.fields import Sampler, recovery
 from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.elements import element_type
 from solver.mesh.grids import grid, grid_size
 from solver.mesh.lines import cells
+
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.results.quantities import Quantity, declare
@@ -22,6 +24,9 @@ from solver.results.view import View
 from solver.scenes.punch import NEAREST, PunchParameters
 from solver.scenes.scene import Effort
 from solver.typing import Array
+
+_NEAR = 0.1
+"""Radius of the region of large strain around the corner, over a."""
 
 
 def model(parameters: PunchParameters) -> Model:
@@ -34,26 +39,34 @@ def model(parameters: PunchParameters) -> Model:
     cells = element_type(p.element).cells
     punch = Body(
         name="punch",
-        mesh=grid(under, up, cells),
+        **_strained(p, grid(under, up, cells)),
         material=p.material(p.punch_stiffness, elastic=p.elastic_punch),
         kinematics=p.state,
         element=p.element,
-        strain=p.strain,
         supports={"left": "x"},
         pressure={"top": p.yield_stress},
     )
     half_plane = Body(
         name="half_plane",
-        mesh=grid(np.concatenate([under, beyond[1:]]), down, cells),
+        **_strained(p, grid(np.concatenate([under, beyond[1:]]), down, cells)),
         material=p.material(),
         kinematics=p.state,
         element=p.element,
-        strain=p.strain,
         supports={"left": "x", "bottom": "y"},
     )
-    sliding: Literal["small", "finite"] = "finite" if p.strain == "large" else "small"
+    sliding: Literal["small", "finite"] = "small" if p.strain == "small" else "finite"
     contact = p.contact(("punch", "bottom"), ("half_plane", "top"), sliding)
     return Model(bodies=(punch, half_plane), contacts=(contact,), singular=(p.corner,))
+
+
+def _strained(p: PunchParameters, mesh: Mesh) -> dict[str, Any]:
+    """Return the mesh of a body, and where its strain is large."""
+    if p.strain != "region":
+        return {"mesh": mesh, "strain": p.strain}
+    x, y = mesh.p[:, mesh.t].mean(axis=1)
+    near = np.hypot(x - p.half_width, y) < _NEAR * p.half_width
+    mesh = mesh.with_subdomains({"corner": np.flatnonzero(near)})
+    return {"mesh": mesh, "strain": "large", "large_region": "corner"}
 
 
 def program(parameters: PunchParameters) -> Program:
