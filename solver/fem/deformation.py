@@ -88,7 +88,7 @@ class Deformation:
         """
         B = self.B[elements]
         DB = np.matmul(tangent, B) * self.weights[elements][:, :, None, None]
-        flat = B.reshape(len(B), -1, B.shape[-1])
+        flat = B.reshape(len(B), B.shape[1] * B.shape[2], B.shape[3])
         return np.asarray(np.matmul(flat.swapaxes(1, 2), DB.reshape(flat.shape)))
 
     def geometric_energy(self, step: Array, stress: Array) -> float:

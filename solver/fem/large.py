@@ -124,7 +124,7 @@ class LargeDiscretisation(Discretisation):
         if large.all():
             return log
         small = super()._measure(values, gradients, mean=mean)
-        return RegionDeformation.joined(small, log, np.flatnonzero(large), at_rest)
+        return RegionDeformation.joined(small, log, np.flatnonzero(large))
 
     @property
     def narrows(self) -> bool:

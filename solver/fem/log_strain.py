@@ -22,7 +22,7 @@ C. Miehe, N. Apel, M. Lambrecht, Comput. Methods Appl. Mech. Engrg 191 (2002) 53
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -230,15 +230,14 @@ class LogDeformation(Deformation):
     def stiffness(self, elements: Some, tangent: Array, stress: Array | None = None) -> Array:
         """See `Deformation`; the geometric term needs ``stress``."""
         stiffness = Deformation.stiffness(self, elements, tangent)
-        return stiffness if stress is None else stiffness + self.geometric(elements, stress)
-
-    def geometric(self, elements: Some, stress: Array) -> Array:
-        """Return the geometric term (k, m, m) of the stiffness of some elements [N/mm]."""
+        if stress is None:
+            return stiffness
         g = self.gradients[elements]
         K = np.moveaxis(self._geometric(stress)[:, :, elements], (0, 1), (2, 3))[..., : g.shape[2]]
         K = K[:, :, : g.shape[2]] * self.weights[elements][:, :, None, None]
         flat = g.reshape(len(g), -1, g.shape[-1])
-        return np.asarray(np.matmul(flat.swapaxes(1, 2), np.matmul(K, g).reshape(flat.shape)))
+        added = np.matmul(flat.swapaxes(1, 2), np.matmul(K, g).reshape(flat.shape))
+        return np.asarray(stiffness + added)
 
     def geometric_energy(self, step: Array, stress: Array) -> float:
         """See `Deformation`."""
@@ -256,29 +255,23 @@ class LogDeformation(Deformation):
 class RegionDeformation(Deformation):
     """A body at its displacements, with logarithmic strain in a region and small strain elsewhere.
 
+    ``B`` is that of small strain in all elements.
+
     Attributes
     ----------
-    small : all elements with small strain, before loading
-    log : the elements of the region, at the displacements
+    log : the elements of the region
     region : (k,) their numbers
     """
 
-    small: Deformation
     log: LogDeformation
     region: Ints
 
     @classmethod
-    def joined(cls, small: Deformation, log: LogDeformation, region: Ints, u: Array) -> Self:
-        """Return a body at displacements u (n,), given its parts; those may be at others."""
-        log, B = log.at(u), small.B.copy()
-        B[region] = log.B
-        strain = small.change(u)
-        strain.reshape(len(strain), *small.weights.shape)[:, region] = log.strain.reshape(
-            len(strain), *log.weights.shape
-        )
+    def joined(cls, small: Deformation, log: LogDeformation, region: Ints) -> Self:
+        """Return a body before loading, given all elements with small strain, and the region."""
         return cls(
-            n=small.n, dofs=small.dofs, strain=strain, B=B, weights=small.weights,
-            small=small, log=log, region=region,
+            n=small.n, dofs=small.dofs, strain=small.strain, B=small.B, weights=small.weights,
+            log=log, region=region,
         )  # fmt: skip
 
     @property
@@ -288,31 +281,51 @@ class RegionDeformation(Deformation):
         linear[self.region] = False
         return linear.ravel()
 
+    def _inside(self, values: Array) -> Array:
+        """Return values (c, n_points) at the points of the region."""
+        each = values.reshape(len(values), *self.weights.shape)[:, self.region]
+        return np.asarray(each.reshape(len(values), -1))
+
+    def _with(self, values: Array, inside: Array | float) -> Array:
+        """Return values (c, n_points), with others ``inside`` the region."""
+        out = values.copy()
+        shape = len(values), len(self.region), self.weights.shape[1]
+        out.reshape(len(values), *self.weights.shape)[:, self.region] = (
+            inside if isinstance(inside, float) else inside.reshape(shape)
+        )
+        return out
+
     def within(self, elements: Bools, dofs: Ints, n: int) -> RegionDeformation:
         """See `Deformation`; the elements contain the region."""
-        number = np.cumsum(elements) - 1
-        region, every = number[self.region], np.ones(len(self.region), dtype=bool)
-        log = self.log.within(every, dofs[region], n)
-        return self.joined(self.small.within(elements, dofs, n), log, region, np.zeros(n))
+        region = (np.cumsum(elements) - 1)[self.region]
+        log = self.log.within(np.ones(len(region), dtype=bool), dofs[region], n)
+        return self.joined(Deformation.within(self, elements, dofs, n), log, region)
 
     def at(self, u: Array) -> Self:
         """See `Deformation`."""
-        return self.joined(self.small, self.log, self.region, u)
+        log = self.log.at(u)
+        return replace(self, log=log, strain=self._with(Deformation.change(self, u), log.strain))
 
-    def _inside(self, stress: Array) -> Array:
-        """Return the values of points (c, n_points) in the region, flat."""
-        each = stress.reshape(len(stress), *self.weights.shape)[:, self.region]
-        return np.asarray(each.reshape(len(stress), -1))
+    def change(self, step: Array) -> Array:
+        """See `Deformation`."""
+        return self._with(Deformation.change(self, step), self.log.change(step))
+
+    def internal_force(self, stress: Array) -> Array:
+        """See `Deformation`."""
+        outside = Deformation.internal_force(self, self._with(stress, 0.0))
+        return outside + self.log.internal_force(self._inside(stress))
 
     def stiffness(self, elements: Some, tangent: Array, stress: Array | None = None) -> Array:
         """See `Deformation`; the geometric term needs ``stress``."""
-        stiffness = Deformation.stiffness(self, elements, tangent)
-        if stress is not None:
-            number = np.full(len(self.B), -1)
-            number[self.region] = np.arange(len(self.region))
-            inside = (own := number[elements]) >= 0
-            stiffness[inside] += self.log.geometric(own[inside], self._inside(stress))
-        return stiffness
+        if stress is None:
+            return Deformation.stiffness(self, elements, tangent)
+        number = np.full(len(self.B), -1)
+        number[self.region] = np.arange(len(self.region))
+        elements, own = np.arange(len(self.B))[elements], number[elements]
+        K, large = np.empty((len(own), *self.dofs.shape[1:] * 2)), own >= 0
+        K[~large] = Deformation.stiffness(self, elements[~large], tangent[~large])
+        K[large] = self.log.stiffness(own[large], tangent[large], self._inside(stress))
+        return K
 
     def geometric_energy(self, step: Array, stress: Array) -> float:
         """See `Deformation`."""
@@ -320,10 +333,8 @@ class RegionDeformation(Deformation):
 
     def cauchy(self, stress: Array, across: Array) -> Array:
         """See `Deformation`."""
-        true, shape = stress.copy(), (len(stress), *self.weights.shape)
         own = self.log.cauchy(self._inside(stress), self._inside(across[None])[0])
-        true.reshape(shape)[:, self.region] = own.reshape(len(own), *self.log.weights.shape)
-        return true
+        return self._with(stress, own)
 
 
 def _at_points(gradients: Array, u: Array) -> Array:
