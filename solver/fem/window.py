@@ -54,12 +54,12 @@ class Region:
         """
         touched = np.asarray(inner.contact[whole.dofs].any(axis=1))
         near = np.zeros(whole.n, dtype=bool)
-        near[whole.dofs[_layered(whole, touched, layers)]] = True
+        near[whole.dofs[layered(whole, touched, layers)]] = True
         contact = np.zeros(whole.n, dtype=bool)
         for surface in surfaces:
             contact[surface.dofs] = near[surface.dofs]
         yields = inner.elements if inner.elements.any() else touched
-        return cls(_layered(whole, yields, layers) | whole.body.large_elements, contact)
+        return cls(layered(whole, yields, layers) | whole.body.large_elements, contact)
 
     def has(self, other: Region) -> bool:
         """Whether it contains another region."""
@@ -72,8 +72,8 @@ class Region:
         return np.packbits(np.concatenate([self.elements, self.contact])).tobytes()
 
 
-def _layered(whole: Discretisation, elements: Bools, layers: int) -> Bools:
-    """Return the elements (n_elements,) extended by layers of neighbours."""
+def layered(whole: Discretisation, elements: Bools, layers: int) -> Bools:
+    """Return the elements (n_elements,) of a body, extended by layers of neighbours."""
     for _ in range(layers):
         within = np.zeros(whole.n, dtype=bool)
         within[whole.dofs[elements]] = True

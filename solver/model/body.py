@@ -156,9 +156,10 @@ class Body:
         for name in self.of_small_strain:
             allowed = f'must be left out of body {self.name!r}, or its strain must be "small"'
             raise ModelError(name, "given with large strain", allowed)
+        large = self.large_elements
         for load in self.every_load if self.large_region else ():
             facets = [self.facets(boundary) for boundary in load.boundaries]
-            inside = self.large_elements[self.mesh.f2t[0, np.concatenate(facets)]]
+            inside = large[self.mesh.f2t[0, np.concatenate(facets)]]
             if self.deformed(load) and not inside.all():
                 allowed = f"must push inside or outside of region {self.large_region!r}, not both"
                 raise ModelError(load.name, load.boundaries, allowed)

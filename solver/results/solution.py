@@ -19,6 +19,7 @@ from solver.contact.system import System
 from solver.errors import ModelError
 from solver.fem.nodes import vectors
 from solver.fem.rigid import RigidMotion
+from solver.fem.window import layered
 from solver.late import Late
 from solver.linear.solvers import one_thread
 from solver.loading.outcome import Cycle, Tally
@@ -39,8 +40,8 @@ from solver.results.increments import Observed, observe
 from solver.results.mesh_fields import MeshFields, write_vtu
 from solver.results.shakedown import Shakedown
 from solver.results.view import Places
-from solver.tensors import to_tensor
-from solver.typing import Array
+from solver.tensors import principal, to_tensor
+from solver.typing import Array, Ints
 
 _NeighbouringRuns = Late("solver.derivatives.neighbours:NeighbouringRuns")
 _LOG = logging.getLogger("solver")
@@ -161,6 +162,20 @@ class Solution:
             raise ModelError("places", X.shape, f"must be positions ({dim}, n) [mm]")
         (found,) = self._fields.at_places(Places(body, X), [self._at(stage)])
         return found._asdict()
+
+    def strained(self, body: str, beyond: float = 0.02, layers: int = 3) -> Ints:
+        """Return the numbers of the elements that strain beyond a limit, and layers around them.
+
+        The strain is the largest principal one in the stages. With small strain, they are the
+        region for `Body.large_region` of a second solution: name them by the mesh's
+        ``with_subdomains``.
+        """
+        whole, most = self.system.full(self._known(body)), np.zeros(0)
+        for converged in self.stages.values():
+            strain = principal(self.system.state(body, converged).strain)[0]
+            most = np.maximum(np.abs(strain).max(axis=0), most if len(most) else 0.0)
+        reached = (most.reshape(whole.weights.shape) > beyond).any(axis=1)
+        return np.flatnonzero(layered(whole, np.asarray(reached), layers))
 
     def contact(self, pair: int = 0, stage: str = "loaded") -> ContactResult:
         """Return pressure, shear, gap and slip at the vertices of the slave of a pair."""

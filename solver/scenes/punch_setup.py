@@ -13,7 +13,7 @@ from skfem import Mesh
 from solver.fem.fields import Sampler, recovery
 from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.elements import element_type
-from solver.mesh.grids import grid, grid_size
+from solver.mesh.grids import grid, grid_size, marked
 from solver.mesh.lines import cells
 
 from solver.model.body import Body
@@ -26,7 +26,7 @@ from solver.scenes.scene import Effort
 from solver.typing import Array
 
 _NEAR = 0.1
-"""Radius of the region of large strain around the corner, over a."""
+"""Half the side of the square region of large strain around the corner, over a."""
 
 
 def model(parameters: PunchParameters) -> Model:
@@ -63,9 +63,8 @@ def _strained(p: PunchParameters, mesh: Mesh) -> dict[str, Any]:
     """Return the mesh of a body, and where its strain is large."""
     if p.strain != "region":
         return {"mesh": mesh, "strain": p.strain}
-    x, y = mesh.p[:, mesh.t].mean(axis=1)
-    near = np.hypot(x - p.half_width, y) < _NEAR * p.half_width
-    mesh = mesh.with_subdomains({"corner": np.flatnonzero(near)})
+    a, near = p.half_width, _NEAR * p.half_width
+    mesh = marked(mesh, "corner", (a - near, a + near), (-near, near))
     return {"mesh": mesh, "strain": "large", "large_region": "corner"}
 
 

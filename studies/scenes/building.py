@@ -149,6 +149,7 @@ class Builder:
                 kinematics=self.scene.kinematics,
                 element=table.element or default_element(mesh, table.strain),
                 strain=table.strain,
+                large_region=table.large_region,
                 cracks=tuple(table.cracks),
                 thickness=self.scene.thickness,
                 supports=supports,

@@ -106,6 +106,7 @@ class BodyTable(SceneTable):
     part: str | None = None
     element: str | None = None
     strain: Literal["small", "large"] = "small"
+    large_region: str = ""
     move: Place = (0.0, 0.0)
     cuts: dict[Label, CutTable] = Field(default_factory=dict)
     cracks: dict[Label, CrackTable] = Field(default_factory=dict)

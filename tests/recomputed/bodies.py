@@ -175,7 +175,9 @@ def of_state(plain: PlainBody, u: Array, plastic: Any, time: float) -> Fields:
     if plane_stress:
         stress[2] = 0.0
     if plain.body.large:
-        stress = _cauchy(plain, stress, u, np.exp((elastic + inelastic)[2] * plane_stress))
+        true = _cauchy(plain, stress, u, np.exp((elastic + inelastic)[2] * plane_stress))
+        large = np.repeat(plain.body.large_elements, plain.volume.shape[1])
+        stress = np.where(large, true, stress)
     gone = (plain.remaining(time) <= GHOST).reshape(plain.volume.shape)[:, 0]
     return Fields(
         plain, stress, nothing[0] if plastic is None else plastic.accumulated,
