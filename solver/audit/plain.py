@@ -217,9 +217,7 @@ class PlainBody:
         plane, hoop = each[_COMPONENT[:dim, :dim]], each[2].copy()
         if self.body.large and u is not None:
             large, (H, around) = self.body.large_elements, self.gradient(u)
-            plane[:, :, large], hoop[large] = nominal(
-                each[:, large], H[:, :, large], around[large]
-            )
+            plane[:, :, large], hoop[large] = nominal(each[:, large], H[:, :, large], around[large])
         return self.nominal_forces(plane, hoop)
 
     def nominal_forces(self, stress: Array, hoop: Array) -> Array:

@@ -46,7 +46,7 @@ class Deformation:
     @property
     def linear(self) -> Bools:
         """Whether strain is linear in displacements, at all points () or at each (n_points,)."""
-        return np.True_
+        return np.array(True)
 
     def within(self, elements: Bools, dofs: Ints, n: int) -> Deformation:
         """Return some elements (n_elements,) before loading; ``dofs`` are theirs, of n unknowns."""

@@ -172,7 +172,7 @@ class LogDeformation(Deformation):
     @property
     def linear(self) -> Bools:
         """See `Deformation`."""
-        return np.False_
+        return np.array(False)
 
     @classmethod
     def of(

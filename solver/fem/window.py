@@ -103,7 +103,7 @@ class Windowed(Discretisation):
         nodes[whole.dofs[region.elements] // whole.dim] = True
         nodes[np.flatnonzero(region.contact) // whole.dim] = True
         self.whole, self.body = whole, whole.body
-        self.elements = nodes[whole.dofs // whole.dim].all(axis=1)
+        self.elements = np.asarray(nodes[whole.dofs // whole.dim].all(axis=1))
         at = np.flatnonzero(nodes)
         self.dim, self.kept = whole.dim, Dofs(at, whole.dim).every
         kept = self.kept

@@ -53,8 +53,8 @@ def narrowed(
 ) -> Converged | None:
     """Return an increment from ``start`` to ``time`` that was solved in windows.
 
-    None if windows are unsuitable: there are links, a body is linear nowhere, or pressures follow it,
-    nothing yields, windows would be large or grow too often, a body loses its contacts, or the
+    None if windows are unsuitable: there are links, a body is linear nowhere or pressures follow
+    it, nothing yields, windows would be large or grow too often, a body loses its contacts, or the
     whole bodies are not in balance. Raises `FailedInWindows` if the increment fails in them.
 
     Parameters

@@ -15,7 +15,6 @@ from solver.loading.program import Program, load_and_release, walked
 from solver.mesh.elements import element_type
 from solver.mesh.grids import grid, grid_size, marked
 from solver.mesh.lines import cells
-
 from solver.model.body import Body
 from solver.model.model import Model
 from solver.results.quantities import Quantity, declare
