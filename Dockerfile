@@ -27,7 +27,7 @@ RUN pip install --require-hashes --requirement requirements.lock ${MKL:+--requir
     && pip install --no-deps --no-build-isolation .
 # Compiled kernels, which `watched.py` copies to where a container may write, and digests of sources.
 RUN cd / \
-    && NUMBA_CACHE_DIR=/app/kernels python -c "import solver.rolling.kernels, solver.fatigue.kernels" \
+    && NUMBA_CACHE_DIR=/app/kernels python -c "import solver.rolling.kernels, solver.fatigue.kernels, solver.fem.kernels" \
     && python -c "from studies.definition.identity import solver_hash; solver_hash()"
 COPY docker/watched.py /usr/local/lib/watched.py
 

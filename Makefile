@@ -4,7 +4,7 @@ INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --con
 SUITE = $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 STAMP := .venv/installed
 COMPILED := .venv/compiled
-KERNELS := solver/rolling/kernels.py solver/fatigue/kernels.py
+KERNELS := solver/rolling/kernels.py solver/fatigue/kernels.py solver/fem/kernels.py
 OWN := examples/own_back_stress.py:examples/own_curve.py:examples/own_friction.py:examples/own_yield_surface.py
 DENO = DENO_DIR=.venv/deno DENO_NO_UPDATE_CHECK=1 $(BIN)/deno
 

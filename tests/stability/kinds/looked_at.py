@@ -21,7 +21,7 @@ def looked_at(scene: Scene, parameters: Any) -> tuple[FinishedRun, Record]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Scene, "record", watched)
-        value = getattr(parameters, scene.branch)
+        value = getattr(parameters, scene.branch) if scene.branch else 0.0
         (record,) = scene.path(parameters, [value], lambda share: None)
     (run,) = seen
     return run, record
