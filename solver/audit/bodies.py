@@ -132,7 +132,7 @@ class AuditedBody:
         # forces at the places before loading; with large strain others follow
         fixed = np.zeros(whole.n) if body.large else self._external
         for load, field in zip(whole.loads.cases, whole.loads.fields.T, strict=True):
-            if body.large and not body.deformed(load):
+            if body.large and not body.turns(load):
                 fixed += load_factor(load.amplitude, self._converged.state.time) * field
         follows = vectors(self._external - fixed, whole.dim)
         moments = self.plain.moments(vectors(fixed, whole.dim), whole.X) - self._declared

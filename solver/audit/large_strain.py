@@ -166,8 +166,9 @@ class _Deformed:
     force : nodal forces (n,) of R N - T, less the change of loads that follow the boundary [N]
     strain : E - e (4, n_points), Mandel
     since : its change since the state ``before``
-    volume : (n_points,) volume of the points [mm3], zero near singular points and where removed
-    most : elastic energy of T, the largest so far [N mm]
+    volume : (n_points,) volume of the points [mm3], zero near singular points, where removed, and
+        where strain is large
+    most : elastic energy of T, also where strain is large, the largest so far [N mm]
     plastic : internal variables
     tangent : response with the tangent D; None where the body has its elastic stiffness
     """
@@ -188,10 +189,12 @@ class _Deformed:
         for point in system.model.singular:
             counts &= ~point.reaches(plain.points)
         large = plain.body.large_elements
-        counts &= ~np.repeat(large, plain.volume.shape[1])
+        known = counts
+        counts = known & ~np.repeat(large, plain.volume.shape[1])
         self.volume = np.where(counts, plain.volume.ravel(), 0.0)
         self.added: Array = np.zeros_like(self.stress) if before is None else before.added
-        self.most: float = max(self.energy(self.stress), 0.0 if before is None else before.most)
+        own = self.elasticity.energy_density(self.stress) @ np.where(known, plain.volume.ravel(), 0)
+        self.most: float = max(float(own), 0.0 if before is None else before.most)
         self.tangent: PartResponse | None = None
         if large.all():
             self.force = np.zeros(self.part.n)
@@ -209,7 +212,7 @@ class _Deformed:
         turned[:, :, large] = 0.0
         self.force = plain.nominal_forces(turned, change[2]).ravel()
         for load in following(self.part):
-            if not plain.body.deformed(load.load):
+            if not plain.body.turns(load.load):
                 self.force -= load.change(u, state.time)
         self.nominal = change.reshape(4, -1)
         change = _mandel(_logarithm(H), np.log(np.maximum(1 + hoop, _FLAT))) - e

@@ -247,7 +247,7 @@ class PlainBody:
         total = np.zeros((1 + self.part.dim, self.part.dim))
         for load, own in zip(self.body.every_load, self._on_body, strict=True):
             at_factor_one = own
-            if self.body.deformed(load) and u is not None:
+            if self.body.turns(load) and u is not None:
                 x = self.part.X + vectors(u, self.part.dim)
                 each = [self._on_boundary(load.push, b, x) for b in load.boundaries]
                 at_factor_one = np.sum(each, axis=0)

@@ -130,6 +130,8 @@ def audit(
     neglected += [large_strain(system, plain, every)] if plane else []
     fixed = any(body.of_small_strain or body.dim == 3 for body in system.model.bodies)
     mend = "" if fixed else ' or set strain = "large"'
+    if any(body.large_region for body in system.model.bodies):
+        mend = " or make the region of large strain larger"
     figures["audit_plastic_strain"] = accumulated_strain(system, states[1])
     figures["audit_large_strain"] = _largest(*(each.share for each in neglected))
     figures["audit_small_sliding"] = max(

@@ -95,6 +95,12 @@ class System:
         surfaces = surfaces_of(model, wholes)
         free = {name for name, whole in self._wholes.items() if whole.rigid.shape[1] == 3}
         free -= {side[0] for side in linked} | {b.name for b in model.bodies if b.axle}
+        for body in model.bodies:
+            if body.large_region and body.name in free:
+                allowed = (
+                    f"must be left out: contact alone holds body {body.name!r}, which can turn"
+                )
+                raise ModelError("large_region", body.large_region, allowed)
         self.model = model = with_slaves(model, surfaces, free)
         every = [*surfaces.items(), *linked.items()]
         own = [[chain for (name, _), chain in every if name == body] for body in wholes]

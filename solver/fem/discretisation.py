@@ -295,11 +295,13 @@ class Discretisation(Nodes, Part):
             return self.elastic_data
         tangent = law.tangent.reshape(*law.tangent.shape[:2], *shape)
         tangent = tangent[:, :, elements].transpose(2, 3, 0, 1)
-        curved = blend and not deformation.linear.all()
-        if curved:
+        of_moduli = blend and not deformation.linear.all()
+        if of_moduli:
             C = self.body.law.stiffness(self.components)
             tangent = (1 - blend) * tangent + blend * C
         now = deformation.stiffness(elements, tangent, law.stress)
         change = now - self.elastic_elements[elements]
         data = self.elastic_data + self._assembly.values(elements, change)
-        return (1 - blend) * data + blend * self.elastic_data if blend and not curved else data
+        if blend and not of_moduli:
+            return (1 - blend) * data + blend * self.elastic_data
+        return data

@@ -1,10 +1,11 @@
 """Loops compiled by numba: logarithmic strain at points, with its derivatives; see `log_strain`.
 
-The types of all arguments are fixed, as in `solver.rolling.kernels`. Arguments of all functions are
+The types of all arguments are fixed, as in `solver.rolling.kernels`. Division by zero is that of
+numpy: flat elements have NaN. Arguments of all functions are
 
     g : (n_elements, n_points, 4 or 5, m) derivative of the displacement gradients xx, xy, yx, yy
         (, hoop) by the unknowns of the element [1/mm]
-    u : (n_elements, m) unknowns of the elements [mm]
+    u : (n_elements, m) unknowns of the elements, x and y of their nodes in turn [mm]
     T : (4, n_elements, n_points) Mandel stress conjugate to the logarithmic strain [MPa]
 """
 
@@ -25,17 +26,22 @@ _TERMS = 15
 _SQRT2 = math.sqrt(2.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gradient(g: Array, u: Array) -> tuple[float, float, float, float, float]:
-    """Return the displacement gradients xx, xy, yx, yy, hoop of a point: g (4 or 5, m), u (m,)."""
+    """Return the displacement gradients xx, xy, yx, yy, hoop of a point: g (4 or 5, m), u (m,).
+
+    Those in the plane are of displacements relative to the first node, which are less rounded.
+    """
     H = np.zeros(5)
-    for row in range(g.shape[0]):
-        for i in range(g.shape[1]):
-            H[row] += g[row, i] * u[i]
+    for row in range(4):
+        for i in range(2, g.shape[1]):
+            H[row] += g[row, i] * (u[i] - u[i % 2])
+    for i in range(g.shape[1] if g.shape[0] == 5 else 0):
+        H[4] += g[4, i] * u[i]
     return H[0], H[1], H[2], H[3], H[4]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _stretch(
     xx: float, xy: float, yx: float, yy: float
 ) -> tuple[float, float, float, float, float, float, float]:
@@ -57,7 +63,7 @@ def _stretch(
     return s, d, o, grown, h / (2 * s), h1 / (2 * s**3), h2 / (2 * s**5)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _by_functions(
     s: float, d: float, o: float, J: float, phi: float, phi1: float, P: Array
 ) -> None:
@@ -72,7 +78,7 @@ def _by_functions(
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _by_gradient(xx: float, xy: float, yx: float, yy: float, Q: Array) -> None:
     """Set Q (3, 4), the derivative of s, d, o by the displacement gradients."""
     a, d = 1 + xx, 1 + yy
@@ -81,7 +87,7 @@ def _by_gradient(xx: float, xy: float, yx: float, yy: float, Q: Array) -> None:
     Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3] = xy, a, d, yx
 
 
-@njit([(_POINTS, _PLANE, _PLANE, boolean, _SOLID, _POINTS)], cache=True)
+@njit([(_POINTS, _PLANE, _PLANE, boolean, _SOLID, _POINTS)], cache=True, error_model="numpy")
 def strains(g: Array, u: Array, weights: Array, mean: bool, E: Array, B: Array) -> None:
     """Set the Mandel strain E (4, n_elements, n_points) and its derivative B by the unknowns.
 
@@ -136,7 +142,7 @@ def strains(g: Array, u: Array, weights: Array, mean: bool, E: Array, B: Array) 
                             B[e, p, a, i] += off
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _in_material(P: Array, T0: float, T1: float, T3: float) -> tuple[float, float, float]:
     """Return the stress xx, yy, xy in the plane on the undeformed body [MPa]."""
     by_s = P[0, 0] * T0 + P[1, 0] * T1 + P[3, 0] * T3
@@ -145,7 +151,7 @@ def _in_material(P: Array, T0: float, T1: float, T3: float) -> tuple[float, floa
     return by_s + by_d, by_s - by_d, by_o
 
 
-@njit([(_POINTS, _PLANE, _PLANE, _SOLID, _SOLID)], cache=True)
+@njit([(_POINTS, _PLANE, _PLANE, _SOLID, _SOLID)], cache=True, error_model="numpy")
 def geometric(g: Array, u: Array, weights: Array, T: Array, K: Array) -> None:
     """Add the geometric stiffness to K (n_elements, m, m) [N/mm]; weights are volumes [mm3]."""
     elements, points, rows, m = g.shape
@@ -199,7 +205,7 @@ def geometric(g: Array, u: Array, weights: Array, T: Array, K: Array) -> None:
                     K[e, i, j] += both
 
 
-@njit([(_POINTS, _PLANE, _SOLID, _PLANE, _SOLID)], cache=True)
+@njit([(_POINTS, _PLANE, _SOLID, _PLANE, _SOLID)], cache=True, error_model="numpy")
 def cauchy(g: Array, u: Array, T: Array, across: Array, true: Array) -> None:
     """Set the Cauchy stress ``true`` (4, n_elements, n_points) [MPa].
 

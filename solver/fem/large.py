@@ -98,7 +98,7 @@ class Follower:
 
 
 def following(part: Discretisation) -> list[Follower]:
-    """Return the loads that follow boundaries where strain is large."""
+    """Return the loads that follow the boundaries of a body, were its strain large."""
     loads = [load for load in part.body.every_load if load.follows and not load.moves]
     return [Follower(part, load, boundary) for load in loads for boundary in load.boundaries]
 
@@ -111,7 +111,7 @@ class LargeDiscretisation(Discretisation):
 
     @cached_property
     def _following(self) -> list[Follower]:
-        return [each for each in following(self) if self.body.deformed(each.load)]
+        return [each for each in following(self) if self.body.turns(each.load)]
 
     def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Deformation:
         large, at_rest = self.body.large_elements, np.zeros(self.n)
@@ -140,24 +140,14 @@ class LargeDiscretisation(Discretisation):
         return force
 
     def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
-        """See `Discretisation`; pressures that follow are whole, too."""
-        if not self.body.large_elements.all():
-            data = super().tangent_data(response, blend)
-            if not self._following:
-                return data
-            K = np.zeros_like(self.elastic_elements)
-            for each in self._following:
-                each.add_stiffness(K, *response.place)
-            return data + self._assembly.values(slice(None), K)
-        law, deformation, shape = response.law, response.deformation, self.weights.shape
-        D = law.tangent
-        if blend:
-            D = (1 - blend) * D + blend * self.body.law.stiffness(self.components)[:, :, None]
-        D = D.reshape(*D.shape[:2], *shape).transpose(2, 3, 0, 1)
-        K = deformation.stiffness(slice(None), D, law.stress)
+        """See `Discretisation`; the stiffness of pressures that follow is whole, too."""
+        data = super().tangent_data(response, blend)
+        if not self._following:
+            return data
+        K = np.zeros_like(self.elastic_elements)
         for each in self._following:
             each.add_stiffness(K, *response.place)
-        return self._assembly.values(slice(None), K)
+        return data + self._assembly.values(slice(None), K)
 
     def distorted(self, u: Array) -> str:
         """Return a message on the element that displacements u (n,) distort most, or nothing.

@@ -148,13 +148,11 @@ class RegionDeformation(Deformation):
         each = values.reshape(len(values), *self.weights.shape)[:, self.region]
         return np.asarray(each.reshape(len(values), -1))
 
-    def _with(self, values: Array, inside: Array | float) -> Array:
+    def _with(self, values: Array, inside: Array) -> Array:
         """Return values (c, n_points), with others ``inside`` the region."""
-        out = values.copy()
-        shape = len(values), len(self.region), self.weights.shape[1]
-        out.reshape(len(values), *self.weights.shape)[:, self.region] = (
-            inside if isinstance(inside, float) else inside.reshape(shape)
-        )
+        out, count = values.copy(), len(values)
+        shape = count, len(self.region), self.weights.shape[1]
+        out.reshape(count, *self.weights.shape)[:, self.region] = inside.reshape(shape)
         return out
 
     def within(self, elements: Bools, dofs: Ints, n: int) -> RegionDeformation:
@@ -174,8 +172,9 @@ class RegionDeformation(Deformation):
 
     def internal_force(self, stress: Array) -> Array:
         """See `Deformation`."""
-        outside = Deformation.internal_force(self, self._with(stress, 0.0))
-        return outside + self.log.internal_force(self._inside(stress))
+        inside = self._inside(stress)
+        outside = Deformation.internal_force(self, self._with(stress, np.zeros_like(inside)))
+        return outside + self.log.internal_force(inside)
 
     def stiffness(self, elements: Some, tangent: Array, stress: Array | None = None) -> Array:
         """See `Deformation`; the geometric term needs ``stress``."""

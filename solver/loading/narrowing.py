@@ -72,8 +72,8 @@ def narrowed(
     own, had = [response.law for response in responses], before.responses
     both = zip(_yields(system, own), _yields(system, had), strict=True)
     yields: Yields = [now if now is None or was is None else now | was for now, was in both]
-    curved = system.model.large
-    if not (before.windows or curved or any(own is not None and own.any() for own in yields)):
+    flows = any(own is not None and own.any() for own in yields)
+    if not (before.windows or flows or system.model.large):
         return None
     touched: Candidates | None = None  # unknown until contact leaves the windows (`Singular`)
     needed = _needed(system, touched, yields)

@@ -56,8 +56,8 @@ class Body:
     condense : whether to reduce the body to its contact surfaces if its material is elastic
     axle : makes an elastic body a wheel, which its supports connect to the hub
     strain : ``small``, or ``large``: logarithmic strain and equilibrium in the deformed body
-    large_region : name of the region of the mesh that alone has large strain; with windows around
-        it the cost is near that of small strain. By default the whole body
+    large_region : name of the region of the mesh that alone has large strain, so that increments
+        are solved in windows; by default the whole body has it
     cracks : names of the cracks of the mesh (`solver.mesh.opened`), whose faces lie on one another
     """
 
@@ -134,10 +134,11 @@ class Body:
         if self.large_region:
             large[:] = False
             large[self.region(self.large_region, "large_region")] = True
+        large.flags.writeable = False
         return large
 
-    def deformed(self, load: Load) -> bool:
-        """Whether a load follows boundaries whose strain is large."""
+    def turns(self, load: Load) -> bool:
+        """Whether a load follows the deformation of its boundaries, where strain is large."""
         facets = [self.facets(boundary) for boundary in load.boundaries if load.follows]
         return any(self.large_elements[self.mesh.f2t[0, own]].any() for own in facets)
 
@@ -157,10 +158,10 @@ class Body:
             allowed = f'must be left out of body {self.name!r}, or its strain must be "small"'
             raise ModelError(name, "given with large strain", allowed)
         large = self.large_elements
-        for load in self.every_load if self.large_region else ():
+        for load in filter(self.turns, self.every_load):
             facets = [self.facets(boundary) for boundary in load.boundaries]
             inside = large[self.mesh.f2t[0, np.concatenate(facets)]]
-            if self.deformed(load) and not inside.all():
+            if not inside.all():
                 allowed = f"must push inside or outside of region {self.large_region!r}, not both"
                 raise ModelError(load.name, load.boundaries, allowed)
 
@@ -214,11 +215,18 @@ class Body:
         ``field`` is the input that an error names.
         """
         known = self.mesh.subdomains or {}
-        elements = np.asarray(known.get(name, ()))
-        if not 0 < len(elements) < self.mesh.nelements:
+        if name not in known:
             listed = ", ".join(known) or "it has none"
-            allowed = f"must name a region of the mesh that is not all of it: {listed}"
-            raise ModelError(field, name, allowed)
+            raise ModelError(
+                field, name, f"must name a region of the mesh that is not all of it: {listed}"
+            )
+        elements, count = np.unique(np.asarray(known[name])), self.mesh.nelements
+        if not len(elements):
+            raise ModelError(field, name, "must have elements; this region of the mesh is empty")
+        if elements.dtype.kind not in "iu" or elements[0] < 0 or elements[-1] >= count:
+            raise ModelError(field, name, f"must have whole numbers of elements, 0 to {count - 1}")
+        if len(elements) == count:
+            raise ModelError(field, name, "must not be all of the body")
         return elements
 
     def facets(self, boundary: str, field: str = "boundary", outer: bool = False) -> np.ndarray:

@@ -170,6 +170,9 @@ class Solution:
         region for `Body.large_region` of a second solution: name them by the mesh's
         ``with_subdomains``.
         """
+        for name, value in {"beyond": beyond, "layers": layers}.items():
+            if not value >= 0:
+                raise ModelError(name, value, "must be at least 0")
         whole, most = self.system.full(self._known(body)), np.zeros(0)
         for converged in self.stages.values():
             strain = principal(self.system.state(body, converged).strain)[0]

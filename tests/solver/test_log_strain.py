@@ -20,8 +20,8 @@ from solver import (
     Pressure,
     RigidBody,
 )
-from solver.fem.large import LargeDiscretisation
 from solver.fem.kernels import NEAR, strains
+from solver.fem.large import LargeDiscretisation
 from solver.mesh import grid, marked
 from solver.model.loads import Centrifugal, Removal
 
@@ -102,6 +102,19 @@ def test_a_rotation_turns_the_forces_and_the_stress(element: str, kinematics: An
     assert np.allclose(full[1], np.einsum("ik,klp,jl->ijp", Q, full[0], Q), atol=1e-9)
 
 
+def at_point(H: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return strain and derivative (4, 5) by H: unknowns of an element whose first node rests."""
+    g, E, B = np.zeros((1, 1, 5, 7)), np.empty((4, 1, 1)), np.empty((1, 1, 4, 7))
+    g[0, 0, :, 2:] = np.eye(5)
+    strains(g, np.append([0.0, 0.0], H)[None], np.ones((1, 1)), False, E, B)
+    return E[:, 0, 0], B[0, 0, :, 2:]
+
+
+def test_a_flat_element_has_no_strain() -> None:
+    for each in at_point(np.array([-1.0, 0.0, 0.0, 0.0, 0.0])):
+        assert np.isnan(each).all()
+
+
 @pytest.mark.parametrize("apart", [0.0, 1e-12, 1e-6, 1e-2, 0.99, 1.01, 10.0])
 def test_strain_is_exact_for_equal_and_nearly_equal_stretches(apart: float) -> None:
     """``apart`` is the ratio q over that at which the power series ends."""
@@ -113,15 +126,13 @@ def test_strain_is_exact_for_equal_and_nearly_equal_stretches(apart: float) -> N
     along = np.array([0.3, 1.0, -0.4, 0.5, 0.2])
 
     def strain(share: float) -> tuple[np.ndarray, np.ndarray]:
-        E, by_H = np.empty((4, 1, 1)), np.empty((1, 1, 4, 5))
-        strains(np.eye(5)[None, None], (H + share * along)[None], np.ones((1, 1)), False, E, by_H)
-        return E[:, 0, 0], by_H[0, 0]
+        return at_point(H + share * along)
 
-    (found, by_H), exact = strain(0.0), (v * np.log(w) / 2) @ v.T
+    (found, slopes), exact = strain(0.0), (v * np.log(w) / 2) @ v.T
     expected = [exact[0, 0], exact[1, 1], 0.0, 2**0.5 * exact[0, 1]]
     assert np.allclose(found, expected, atol=4e-16)
 
-    assert np.allclose(by_H @ along, four(lambda share: strain(share)[0], 1e-3), atol=1e-11)
+    assert np.allclose(slopes @ along, four(lambda share: strain(share)[0], 1e-3), atol=1e-11)
 
 
 def test_an_inverted_element_has_no_stress() -> None:

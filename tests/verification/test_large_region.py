@@ -12,16 +12,22 @@ from scipy.optimize import brentq
 import solver.loading.stepper as stepper
 from solver import (
     Body,
+    ContactPair,
     Displacement,
+    InitialStress,
     Material,
     Model,
     ModelError,
     PathControl,
     Pressure,
+    RigidBody,
+    Temperature,
     Traction,
     solve,
 )
 from solver.mesh import grid, marked
+from solver.model.loads import BodyForce
+from solver.model.rigid import line
 from solver.results.record import Record, Status
 from studies.scenes.registry import scene_named
 
@@ -112,12 +118,62 @@ def test_the_elements_that_strain_are_a_region() -> None:
     assert not solve(Model(bodies=(second,)), load=1.0).audit().violations
 
 
-@pytest.mark.parametrize(("fields", "field"), [
-    ({"strain": "small"}, "large_region"),
-    ({"large_region": "lower"}, "large_region"),
-    ({"loads": (Pressure(boundary="right", value=1.0),)}, "pressure"),
+@pytest.mark.parametrize("load", [
+    BodyForce(y=-1.0), Temperature(rise=300.0, expansion=1e-5),
+    InitialStress(xx=10.0),
+    Pressure(boundary="top", value=100.0),
+], ids=lambda load: type(load).__name__)  # fmt: skip
+def test_loads_of_all_kinds_act_on_a_body_with_a_region(load: Any) -> None:
+    found = solve(Model(bodies=(bar(loads=(load,)),)), load=1.0)
+    assert not found.audit().violations
+    assert np.abs(found.displacement("bar", "loaded")).max() > 0
+
+
+def test_a_hinge_turns_the_rest_of_a_beam_by_a_small_angle() -> None:
+    """The free end has little stress: what small strain neglects is small beside the hinge."""
+    mesh = marked(grid(np.linspace(0, 20, 81), np.linspace(0, 1, 5)), "root", x=(0.0, 4.0))
+    pushed = {"pushed": lambda x: (x[1] > 0.999) & (x[0] > 2.4) & (x[0] < 3.0)}
+    mesh = mesh.with_boundaries(pushed)
+    beam = bar(mesh=mesh, material=STEEL, large_region="root", supports={"left": "xy"},
+               loads=(Displacement(boundary="pushed", y=-0.044),))  # fmt: skip
+    found = solve(Model(bodies=(beam,)), load=1.0, control=PathControl(load_step=0.1)).audit()
+    assert not found.violations
+    assert not found.outside
+
+
+def test_a_body_that_contact_alone_holds_is_refused() -> None:
+    """Its rest has small strain, and cannot turn with it."""
+    block = bar(supports={})
+    lower = RigidBody(name="plate", surfaces={"face": line((2.0, 0.0), (-1.0, 0.0))})
+    pair = ContactPair(slave=("bar", "bottom"), master=("plate", "face"))
+    with pytest.raises(ModelError, match="contact alone holds"):
+        solve(Model(bodies=(block,), rigid=(lower,), contacts=(pair,)), load=1.0)
+
+
+def region(elements: Any) -> Any:
+    mesh = grid(np.linspace(0, 1, 3), np.linspace(0, 2, 5))
+    return mesh.with_subdomains({"upper": np.asarray(elements)})
+
+
+@pytest.mark.parametrize(("fields", "field", "allowed"), [
+    ({"strain": "small"}, "large_region", "left out"),
+    ({"large_region": "lower"}, "large_region", "upper"),
+    ({"mesh": region([])}, "large_region", "empty"),
+    ({"mesh": region(range(8))}, "large_region", "all of the body"),
+    ({"mesh": region([3, 99])}, "large_region", "0 to 7"),
+    ({"mesh": region([-1])}, "large_region", "0 to 7"),
+    ({"loads": (Pressure(boundary="right", value=1.0),)}, "pressure", "not both"),
 ])  # fmt: skip
-def test_regions_that_cannot_be_are_refused(fields: dict[str, Any], field: str) -> None:
-    with pytest.raises(ModelError) as error:
+def test_regions_that_cannot_be_are_refused(
+    fields: dict[str, Any], field: str, allowed: str
+) -> None:
+    with pytest.raises(ModelError, match=allowed) as error:
         bar(**fields)
     assert field in error.value.field
+
+
+@pytest.mark.parametrize("given", [{"beyond": float("nan")}, {"layers": -1}])
+def test_limits_of_a_region_are_checked(given: dict[str, Any]) -> None:
+    small = bar(strain="small", large_region="", loads=(Traction(boundary="top", y=1.0),))
+    with pytest.raises(ModelError, match="at least 0"):
+        solve(Model(bodies=(small,)), load=1.0).strained("bar", **given)

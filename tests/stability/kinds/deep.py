@@ -97,7 +97,7 @@ def _mandrel(rng: np.random.Generator) -> dict[str, Any]:
 
 def _clinch(rng: np.random.Generator) -> dict[str, Any]:
     return {"stroke": float(rng.uniform(0.2, 1.2)), "friction": float(rng.uniform(0, 0.4)),
-            "size": 0.2}  # fmt: skip
+            "size": 0.25}  # fmt: skip
 
 
 _KINDS = {"ball": _ball, "punch": _punch, "cone": _cone, "fillet": _fillet, "mandrel": _mandrel,
