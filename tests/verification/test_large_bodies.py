@@ -366,6 +366,28 @@ def test_a_mandrel_moves_through_a_hole_and_the_work_of_its_force_is_found_again
     assert record.scalars["hoop_at_hole"] < -320.0
 
 
+def clinched(**parameters: float) -> Record:
+    scene = read_scene(ROOT / "data/scenes/clinch.toml")
+    (record,) = scene.path(scene.parameters(**parameters), [0.0], lambda done: None)
+    return record
+
+
+@pytest.mark.long
+def test_sheets_are_clinched_or_the_element_that_distorts_is_named() -> None:
+    joined, deeper = clinched(stroke=1.4), clinched(stroke=2.2)
+    assert joined.status is Status.OK, joined.message
+    assert -7000 < joined.scalars["punch_force"] < -5000
+    assert "the element of upper that was at (0.0625, 1.06" in deeper.message
+    assert "make the elements there larger, or reduce the load" in deeper.message
+
+
+def test_sheets_begin_to_be_drawn_into_the_die() -> None:
+    """Coarse elements: the audit asks for smaller ones, and both sheets bend."""
+    record = clinched(stroke=0.1, size=0.25)
+    assert record.status in (Status.OK, Status.AUDIT_FAILED)
+    assert -2000 < record.scalars["punch_force"] < -500
+
+
 @pytest.mark.parametrize(
     "law",
     [
