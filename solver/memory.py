@@ -26,6 +26,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from solver.errors import ModelError
+from solver.files import read_file
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -48,6 +49,18 @@ def bytes_in(text: str) -> int | None:
         return None
     number, prefix, binary = found.groups()
     return round(float(number) * (1024 if binary else 1000) ** " kMGT".index(prefix or " "))
+
+
+def peak_memory() -> int:
+    """Return the largest memory of this process so far [bytes].
+
+    On Linux getrusage begins with that of the process that started this one.
+    """
+    with suppress(OSError, ValueError):
+        (size,) = re.findall(rb"VmHWM:\s*(\d+) kB", read_file("/proc/self/status"))
+        return 1024 * int(size)
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most * (1 if sys.platform == "darwin" else 1024)
 
 
 def most_kept() -> int:

@@ -10,8 +10,6 @@ import datetime
 import json
 import os
 import platform
-import resource
-import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -21,6 +19,7 @@ import numpy as np
 
 import solver
 from solver.files import read_file
+from solver.memory import peak_memory
 from studies.storage.dataset import Variable
 from studies.storage.provenance import NONE
 from studies.storage.seal import digest_of
@@ -55,7 +54,8 @@ def how(began: str) -> dict[str, str]:
     """
     if not began:
         return {}
-    return dict(zip(MEANINGS, (began, now(), _machine(), _peak_memory()), strict=True))
+    memory = f"{peak_memory() / 1e6:.0f}MB"
+    return dict(zip(MEANINGS, (began, now(), _machine(), memory), strict=True))
 
 
 def of_runs(
@@ -134,9 +134,3 @@ def _processor() -> str:
         lines = []
     named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
     return next(named, "") or platform.processor() or platform.machine()
-
-
-def _peak_memory() -> str:
-    """Return the largest memory of this process so far, such as ``312MB``."""
-    size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return f"{size * (1 if sys.platform == 'darwin' else 1024) / 1e6:.0f}MB"

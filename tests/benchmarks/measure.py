@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -47,12 +45,6 @@ class Timed(Generic[T]):
     cpu: float
     spread: float
     repeats: int
-
-
-def peak_memory() -> float:
-    """Return the peak memory of this process [MB]; its children would inherit that of getrusage."""
-    (line,) = re.findall(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())
-    return int(line) / 1e3
 
 
 def timed(function: Callable[[int], T], repeats: int = REPEATS) -> Timed[T]:

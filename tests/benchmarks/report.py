@@ -18,7 +18,8 @@ import numpy as np
 from solver import __version__
 from solver.linear import pardiso
 from solver.linear.solvers import chosen
-from tests.benchmarks.measure import Point, peak_memory
+from solver.memory import peak_memory
+from tests.benchmarks.measure import Point
 
 
 def conditions() -> list[str]:
@@ -91,7 +92,7 @@ def store(points: Sequence[Point], out: Path) -> None:
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "conditions": conditions(),
         "linear_solver": chosen("auto"),
-        "peak_memory": round(peak_memory()),
+        "peak_memory": round(peak_memory() / 1e6),
         "points": series,
     }
     path.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")

@@ -191,8 +191,9 @@ def test_files_are_as_large_as_those_that_keep_as_much(store: Store) -> None:
 
 
 MEASURED = """
-import importlib, re, sys
+import importlib, sys
 from solver import SCENES
+from solver.memory import peak_memory
 from studies.execution.forks import NEEDED
 for name in NEEDED:
     importlib.import_module(name)
@@ -201,9 +202,7 @@ parameters = scene.parameters(accuracy="draft")
 value = getattr(parameters, scene.branch)
 for _ in scene.path(parameters, [value], lambda share: None):
     pass
-# not getrusage, whose largest size is that of the process that started this one
-status = open("/proc/self/status").read()
-print(1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status)[1]))
+print(peak_memory())
 """
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import datetime
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -84,6 +86,17 @@ def test_a_study_without_a_file_is_kept_as_json(tmp_path: Path) -> None:
     with open_study(run(study, Store(tmp_path))) as dataset:
         (text,) = json.loads(dataset.attrs["files"]).values()
     assert Study.from_dict(json.loads(text)).id == study.id
+
+
+@pytest.mark.processes
+def test_the_memory_of_a_run_is_not_that_of_the_process_that_started_its_own() -> None:
+    large = np.ones(80_000_000)  # 640 MB, as a service may have
+    command = "from studies.storage.ran import how; print(how('now')['run_peak_memory'])"
+    done = subprocess.run(
+        [sys.executable, "-c", command], capture_output=True, text=True, check=True,
+        cwd=Path(ran.__file__).parents[2],
+    )  # fmt: skip
+    assert 1e7 < bytes_in(done.stdout.strip()) < large.nbytes / 2
 
 
 def test_each_run_says_when_and_where_it_was_computed(tmp_path: Path) -> None:
