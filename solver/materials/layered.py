@@ -124,7 +124,7 @@ class Layered(Law):
     # -- layers --------------------------------------------------------------------------------
 
     @cached_property
-    def _layers(self) -> list[tuple[float, Law]]:
+    def layers(self) -> list[tuple[float, Law]]:
         """Weight and law of each layer that yields."""
         return [
             (weight, Chaboche(elasticity=self.elasticity, curve=Voce(yield_stress=stress)))
@@ -137,18 +137,20 @@ class Layered(Law):
         rest = 1 - sum(self.weights)
         return rest if rest > 1e-12 else 0.0
 
-    def _states(self, state: PlasticState) -> list[PlasticState]:
+    def states(self, state: PlasticState) -> list[PlasticState]:
+        """Return the internal variables of each layer."""
         assert isinstance(state, LayeredState)
         both = zip(state.layer_strain, state.layer_accumulated, strict=True)
         return [PlasticState(*each) for each in both]
 
-    def _together(self, layers: Sequence[PlasticState]) -> LayeredState:
+    def together(self, layers: Sequence[PlasticState]) -> LayeredState:
+        """Return the internal variables of all layers together from those of each."""
         strain = np.stack([layer.plastic_strain for layer in layers])
         accumulated = np.stack([layer.accumulated for layer in layers])
         weights = np.array(self.weights)
         return LayeredState(
             plastic_strain=np.tensordot(weights, strain, axes=1),
-            accumulated=weights @ accumulated,
+            accumulated=np.tensordot(weights, accumulated, axes=1),
             layer_strain=strain,
             layer_accumulated=accumulated,
         )
@@ -158,7 +160,7 @@ class Layered(Law):
         C = self.stiffness(len(stress))
         return [
             stress + C @ (state.plastic_strain - layer.plastic_strain)
-            for layer in self._states(state)
+            for layer in self.states(state)
         ]
 
     # -- the law, see `Law` --------------------------------------------------------------------
@@ -177,7 +179,7 @@ class Layered(Law):
     def initial(self, n_points: int, n_components: int) -> LayeredState:
         """Return the state of layers that have never yielded."""
         virgin = PlasticState.virgin(n_points, n_components)
-        return self._together([virgin] * len(self.weights))
+        return self.together([virgin] * len(self.weights))
 
     def flow_stress(self, state: PlasticState) -> Array:
         """Return the yield stress of the weakest layer (n_points,) [MPa]."""
@@ -200,7 +202,7 @@ class Layered(Law):
 
     def yield_value(self, stress: Array, state: PlasticState) -> Array:
         """Return the largest yield function of all layers (n_points,) [MPa]."""
-        each = zip(self._layers, self._stresses(stress, state), self._states(state), strict=True)
+        each = zip(self.layers, self._stresses(stress, state), self.states(state), strict=True)
         return np.max([law.yield_value(own, layer) for (_, law), own, layer in each], axis=0)
 
     def dissipation(self, before: PlasticState, response: Response) -> Array:
@@ -208,7 +210,7 @@ class Layered(Law):
         total = np.zeros(response.stress.shape[1])
         stresses = self._stresses(response.stress, response.state)
         layers = zip(
-            self.weights, stresses, self._states(before), self._states(response.state), strict=True
+            self.weights, stresses, self.states(before), self.states(response.state), strict=True
         )
         for weight, stress, old, new in layers:
             total += weight * (stress * (new.plastic_strain - old.plastic_strain)).sum(axis=0)
@@ -221,11 +223,11 @@ class Layered(Law):
         C = self.stiffness(len(stress))
         worst = np.abs(stress - C @ (strain - after.plastic_strain)).max(axis=0)
         for state in (before, after):  # the means are those of the layers
-            together = self._together(self._states(state))
+            together = self.together(self.states(state))
             error = np.abs(state.plastic_strain - together.plastic_strain).max(axis=0)
             error = np.maximum(error, np.abs(state.accumulated - together.accumulated))
             worst = np.maximum(worst, 2 * self.elasticity.shear_modulus * error)
-        states = zip(self._layers, self._states(before), self._states(after), strict=True)
+        states = zip(self.layers, self.states(before), self.states(after), strict=True)
         for (_, law), old, new in states:
             own = law.misfit(strain, C @ (strain - new.plastic_strain), old, new)
             worst = np.maximum(worst, own)
@@ -238,10 +240,10 @@ class Layered(Law):
         tangent = np.repeat((self.elastic_weight * C)[:, :, None], strain.shape[1], axis=2)
         yielding = np.zeros(strain.shape[1], dtype=bool)
         states = []
-        for (weight, law), layer in zip(self._layers, self._states(state), strict=True):
+        for (weight, law), layer in zip(self.layers, self.states(state), strict=True):
             own = law.respond(strain, layer)
             stress += weight * own.stress
             tangent += weight * own.tangent
             yielding |= own.yielding
             states.append(own.state)
-        return Response(stress, tangent, self._together(states), yielding)
+        return Response(stress, tangent, self.together(states), yielding)

@@ -2,6 +2,8 @@
 
 The loops (`solver.rolling.kernels`) are the radial return of linear hardening from point to point.
 
+Layers of perfectly plastic materials share one strain: each flows along the rows by these loops.
+
 With any other law all rows flow together, column by column. Every increment calls `Law.respond`.
 The only assumption on the law is a convex yield surface: a row that is inside at both ends of a
 straight strain path is inside all along it, and needs no increments.
@@ -22,6 +24,7 @@ import numpy as np
 from solver.errors import NotConverged
 from solver.late import late
 from solver.materials.law import Law
+from solver.materials.layered import Layered
 from solver.materials.radial_return import SQRT23
 from solver.materials.state import PlasticState
 from solver.typing import Array, Ints
@@ -232,6 +235,29 @@ class SteppedSweep:
         return np.split(every, np.cumsum([len(at) for at in self._flowing])[:-1])
 
 
+class LayeredSweep(SteppedSweep):
+    """Sweep of a layered material along rows, layer by layer; see `CompiledSweep`."""
+
+    def __init__(self, law: Layered, strain: Array, start: PlasticState, parts: int) -> None:
+        self._law: Layered = law
+        self._start, self._strain = start, np.ascontiguousarray(np.moveaxis(strain, 2, 0))
+        each = zip(law.layers, law.states(start), strict=True)
+        self._layers = [CompiledSweep(own, strain, state, parts) for (_, own), state in each]
+        self.states = law.together([layer.states for layer in self._layers])
+        self._packed = self.states.packed
+
+    @property
+    def ago(self) -> PlasticState:
+        """Internal variables at the beginning of the last increment before each column."""
+        return self._law.together([layer.ago for layer in self._layers])
+
+    def _changes(self, added: Array) -> tuple[Array, Array]:
+        each = [layer._changes(added) for layer in self._layers]
+        every = [PlasticState(np.moveaxis(plastic, 2, 0), total) for plastic, total in each]
+        together = self._law.together(every)
+        return np.moveaxis(together.plastic_strain, 0, 2), together.packed[..., -1].T
+
+
 class SteppedFlow(SteppedSweep):
     """Flow of a material with any law along rows; see `CompiledFlow`."""
 
@@ -254,6 +280,10 @@ class SteppedFlow(SteppedSweep):
         by_state, by_strain = slopes[..., :n], slopes[..., n:]
         stress = (C[_FREE] @ by_state, (C - C @ by_strain)[:, _FREE][..., _FREE])
         return by_state + by_strain[..., _FREE] @ _solved(stress[1], stress[0])
+
+
+class LayeredFlow(SteppedFlow, LayeredSweep):
+    """Flow of a layered material along rows: `SteppedFlow` behind a `LayeredSweep`."""
 
 
 def _at_rest(law: Law, state: PlasticState) -> _Left:
@@ -317,7 +347,7 @@ def allowed_inflow(law: Law, most_added: float) -> float:
 
 
 def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:
-    """Return the sweep of material along rows; linear hardening uses compiled code.
+    """Return the sweep of material along rows; linear hardening and layers use compiled code.
 
     Parameters
     ----------
@@ -326,9 +356,13 @@ def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:
     start : internal variables (..., n_rows) before the pass
     parts : number of equal increments of strain from one column to the next
     """
+    if type(law) is Layered:
+        return LayeredSweep(law, strain, start, parts)
     return (CompiledSweep if law.linear_hardening else SteppedSweep)(law, strain, start, parts)
 
 
 def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
     """Return the sweep and the residual state behind it; for arguments see `sweep_of`, n is 4."""
+    if type(law) is Layered:
+        return LayeredFlow(law, strain, start, parts)
     return (CompiledFlow if law.linear_hardening else SteppedFlow)(law, strain, start, parts)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, cast
+from typing import Any, NoReturn, cast
 
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 from scipy.spatial import cKDTree
 
-from solver import ModelError, Record
+from solver import ModelError, NotConverged, Record
+from solver.errors import WindowTooSmall
 from solver.results.mesh_fields import to_meshio
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
+from solver.rolling.passing import TOLERANCE
 from solver.rolling.rail.track import PrismField
 from solver.rolling.scenes.initial_stress import RollerStraightened
 from solver.rolling.scenes.wheel_rail import ELEMENT_SIZE, WheelRailParameters
@@ -207,6 +209,27 @@ def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch
     (record,) = again
     assert record.status is Status.OK
     assert record.scalars["max_plastic_strain"] == free().scalars["max_plastic_strain"]
+
+
+def test_an_easier_pass_too_large_for_the_largest_zone_ends_the_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not the draft alone, of which the standard elements would take ten times as long."""
+    tolerances: list[float] = []
+
+    def lost(*_: Any, tolerance: float, **__: Any) -> NoReturn:
+        tolerances.append(tolerance)
+        if tolerance == TOLERANCE:
+            raise NotConverged("no steady pass was found")
+        raise WindowTooSmall("the window is too small around for a steady pass")
+
+    monkeypatch.setattr("solver.rolling.scenes.rail_passes.REACHES", (0.6,))
+    monkeypatch.setattr("solver.rolling.search.passing", lost)
+    (record,) = SCENE.path(SCENE.parameters(**PUBLISHED), [1], lambda share: None)
+    assert record.status is Status.NOT_CONVERGED
+    assert "around for a steady pass, in the largest zone, " in record.message
+    assert record.message.endswith("; lower the load")
+    assert tolerances[0] == TOLERANCE != tolerances[1] and len(tolerances) == 2
 
 
 @pytest.mark.parametrize("distance", [29.0, 30.0, 120.0])
