@@ -72,6 +72,19 @@ def test_a_scene_that_hangs_is_stopped_even_where_errors_are_kept() -> None:
     assert end(run, 0.05, judge=right) is Verdict.HUNG
 
 
+def test_so_is_one_that_is_stopped_in_compiled_code() -> None:
+    """Python then raises an error of its own: a result came, with an exception set."""
+
+    def run() -> None:
+        try:
+            while True:
+                sum(range(1000))
+        except BaseException as late:
+            raise SystemError("returned a result with an exception set") from late
+
+    assert end(run, 0.05, judge=right) is Verdict.HUNG
+
+
 def test_the_table_counts_every_verdict_and_names_the_scene() -> None:
     trials = [
         attempt("good-0", Scene(what="fine", run=lambda: 1, judge=right)),

@@ -135,7 +135,9 @@ def attempt(name: str, scene: Scene, patience: float = PATIENCE) -> Trial:
     except NotConverged as error:
         verdict, message = _stopped(scene, error), f"{type(error).__name__}: {error}"
     except Exception as error:  # whatever else comes out is the fault looked for
-        verdict, message = Verdict.CRASHED, f"{type(error).__name__}: {error}"
+        late = isinstance(error.__cause__, Hung)  # in compiled code, which returns all the same
+        verdict = Verdict.HUNG if late else Verdict.CRASHED
+        message = f"{type(error).__name__}: {error}"
     return Trial(
         name=name,
         what=scene.what,
