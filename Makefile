@@ -77,7 +77,7 @@ clean: ## remove the environment and caches; results in out/ stay
 	find solver studies service residua tests -name __pycache__ -prune -exec rm -rf {} +
 
 # A new environment has the pip and the setuptools of the day when its Python was built. Of the
-# libraries' 11,000 modules a third are ever imported: they are compiled then, not all here for 40 s.
+# libraries' 11,000 modules a third are ever imported: the next rule compiles these, not all for 40 s.
 $(STAMP): pyproject.toml constraints.txt $(BIN)/python
 	$(INSTALL) pip setuptools
 	$(INSTALL) --no-compile --no-build-isolation --editable '.[dev,docs,mkl,parquet,zarr]'
@@ -85,7 +85,7 @@ $(STAMP): pyproject.toml constraints.txt $(BIN)/python
 
 # Else the first run that needs a kernel would wait for the compiler, for 13 s.
 $(COMPILED): $(STAMP) $(KERNELS)
-	echo $(subst /,.,$(KERNELS:.py=)) | xargs -n 1 -P 2 sh -c '$(BIN)/python -c "import $$0"'
+	echo $(subst /,.,$(KERNELS:.py=)) studies.execution.run service.app | xargs -n 1 -P 2 sh -c '$(BIN)/python -c "import $$0"'
 	@touch $@
 
 $(BIN)/python:

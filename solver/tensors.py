@@ -60,16 +60,16 @@ def identity(n_components: int) -> Array:
 
 @cache
 def projections(n_components: int) -> tuple[Array, Array]:
-    """Return what takes from a tensor three times its mean, and its deviator, read-only.
+    """Return the matrices that give the trace times the identity, and the deviator; read-only.
 
     Both have the shape (n_components, n_components), on Mandel components.
     """
     one = identity(n_components)
-    mean = np.outer(one, one)
-    shape = np.eye(n_components) - mean / 3.0
-    for each in (mean, shape):
+    trace = np.outer(one, one)
+    deviatoric = np.eye(n_components) - trace / 3.0
+    for each in (trace, deviatoric):
         each.flags.writeable = False
-    return mean, shape
+    return trace, deviatoric
 
 
 def deviator(mandel: Array) -> Array:

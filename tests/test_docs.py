@@ -278,6 +278,7 @@ def test_blocks_of_a_page_run(
     for folder in ("studies", "scenes"):
         shutil.copytree(ROOT / "data" / folder, tmp_path / "data" / folder)
     first = page == FIRST
+    assert all((tmp_path / "data" / "studies" / name).exists() for name in LESS if "/" not in name)
     for study in () if first else (tmp_path / "data" / "studies").glob("*.toml"):
         changed = shortened(study.read_text(), LESS.get(study.name, {}))
         study.write_text(coarse(changed))

@@ -135,7 +135,7 @@ def fading_return(
     for X, (modulus, recall) in zip(back, constants, strict=True):
         if recall:
             first = first + np.maximum(von_mises(X) - modulus / recall, 0.0)
-    growth = falling_root(
+    growth = falling_root(  # which begins at its lower end, known from above
         lambda x: begun if x is nothing else excess(x),
         nothing, first / (3 * G) * (1 + 1e-9), von_mises(s),
     )  # fmt: skip

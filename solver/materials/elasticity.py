@@ -46,8 +46,8 @@ class Elasticity(Checked):
 
     def stiffness(self, n_components: int) -> Array:
         """Return the stiffness (n_components, n_components) on Mandel strain [MPa]."""
-        mean, deviator = projections(n_components)
-        return self.bulk_modulus * mean + 2 * self.shear_modulus * deviator
+        trace, deviatoric = projections(n_components)
+        return self.bulk_modulus * trace + 2 * self.shear_modulus * deviatoric
 
     def strain(self, stress: Array) -> Array:
         """Return the Mandel strain (n_components, ...) of Mandel stress of that shape [MPa]."""

@@ -124,12 +124,12 @@ class Layered(Law):
     # -- layers --------------------------------------------------------------------------------
 
     @cached_property
-    def layers(self) -> list[tuple[float, Law]]:
+    def layers(self) -> tuple[tuple[float, Law], ...]:
         """Weight and law of each layer that yields."""
-        return [
+        return tuple(
             (weight, Chaboche(elasticity=self.elasticity, curve=Voce(yield_stress=stress)))
             for weight, stress in zip(self.weights, self.yields, strict=True)
-        ]
+        )
 
     @property
     def elastic_weight(self) -> float:

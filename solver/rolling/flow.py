@@ -120,6 +120,7 @@ class CompiledFlow(CompiledSweep):
         return plastic, close_along(*ends, self._law, *self._closing)
 
 
+_NO_STATE = "the law has no state for the strains of a steady pass"
 _STEP = 1e-6
 """Step of differences over the largest value of a variable, or over the yield strain."""
 _AT_REST, _ALMOST = 1e-11, 1e-8
@@ -165,7 +166,7 @@ class SteppedSweep:
                 self._ago[..., at, column] = ago.packed
             self._packed[..., column] = now
         if not np.isfinite(self._packed).all():
-            raise NotConverged("the law has no state for the strains of a steady pass")
+            raise NotConverged(_NO_STATE)
         self.states = start.unpacked(self._packed)
 
     @property
@@ -245,6 +246,8 @@ class LayeredSweep(SteppedSweep):
         self._layers = [CompiledSweep(own, strain, state, parts) for (_, own), state in each]
         self.states = law.together([layer.states for layer in self._layers])
         self._packed = self.states.packed
+        if not np.isfinite(self._packed).all():
+            raise NotConverged(_NO_STATE)
 
     @property
     def ago(self) -> PlasticState:
@@ -252,10 +255,12 @@ class LayeredSweep(SteppedSweep):
         return self._law.together([layer.ago for layer in self._layers])
 
     def _changes(self, added: Array) -> tuple[Array, Array]:
-        each = [layer._changes(added) for layer in self._layers]
-        every = [PlasticState(np.moveaxis(plastic, 2, 0), total) for plastic, total in each]
-        together = self._law.together(every)
-        return np.moveaxis(together.plastic_strain, 0, 2), together.packed[..., -1].T
+        plastic, ends = np.zeros(added.shape), []
+        for (weight, _), layer in zip(self._law.layers, self._layers, strict=True):
+            own, total = layer._changes(added)
+            plastic += weight * own
+            ends.append(PlasticState(own[:, -1].T, total[:, -1]))
+        return plastic, self._law.together(ends).packed.T
 
 
 class SteppedFlow(SteppedSweep):

@@ -14,6 +14,7 @@ it does not; more than 30 % of plastic strain in a pass counts as the limit load
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -62,8 +63,10 @@ def search(
 
     Parameters
     ----------
-    wider : whether to raise the error of an easier pass that needs a larger window, or too many
-        solves; otherwise the error is that of the pass itself
+    wider : whether the search ends with the error of any tried pass that needs a larger window, or
+        too many solves. Otherwise too many solves prove nothing, nor does a window that is too
+        small for a heavier load or for full slip; a window that is too small for an easier pass is
+        the error, with a limit load of the pass itself as its cause
 
     Raises
     ------
@@ -101,13 +104,15 @@ def search(
     # to 12 digits: the rounding of a ratio that is one of those below must not decide
     own = float(f"{linear.modulus / (E + linear.modulus):.12g}") if linear else 0.0
     largest = np.inf if material.hardens else _LARGE
+    unproved = () if wider else (WindowTooSmall,)
     rolls = load.load
 
     def easier(found: Pass[S] | NotConverged) -> Pass[S] | NotConverged:
         if isinstance(found, NoContact):  # contact on the elastic track differs from the final one
             found = _approached(exactly, rolls.driven, _LIGHTER, None, found)
         if isinstance(found, NoContact):
-            _check_spinning(exactly, rolls)
+            with suppress(*unproved):
+                _check_spinning(exactly, rolls)
         # on a body that has yielded more hardening would act on strain accumulated with less
         if own < _HARDEST and not before.accumulated.any():
             if isinstance(found, NotConverged):
@@ -116,8 +121,11 @@ def search(
                 )
             if isinstance(found, NotConverged) and not isinstance(found, LimitLoad):
                 above = rolls.scaled(_HEAVIER[0])
-                begun = _tried(_fading, partial(eased, above), partial(exactly, above), own, np.inf)
-                found = _approached(exactly, rolls.scaled, _HEAVIER[1:], begun, found)
+                with suppress(*unproved):
+                    begun = _tried(
+                        _fading, partial(eased, above), partial(exactly, above), own, np.inf
+                    )
+                    found = _approached(exactly, rolls.scaled, _HEAVIER[1:], begun, found)
         else:
             if guess is not None and isinstance(found, NotConverged):  # it may be unsuitable
                 found = _tried(exactly, rolls)
@@ -128,9 +136,10 @@ def search(
     found = _tried(exactly, rolls, guess)
     try:
         found = easier(found)
-    except (WindowTooSmall, TooLong):
-        if wider:
-            raise
+    except (WindowTooSmall, TooLong) as error:
+        if wider or isinstance(error, WindowTooSmall):
+            limit = found if isinstance(found, LimitLoad) and not wider else error.__cause__
+            raise error from limit
     if isinstance(found, NotConverged):
         raise found
     if found.most_added > largest:

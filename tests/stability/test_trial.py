@@ -72,15 +72,18 @@ def test_a_scene_that_hangs_is_stopped_even_where_errors_are_kept() -> None:
     assert end(run, 0.05, judge=right) is Verdict.HUNG
 
 
-def test_so_is_one_that_is_stopped_in_compiled_code() -> None:
-    """Python then raises an error of its own: a result came, with an exception set."""
+@pytest.mark.parametrize("kind", [SystemError, NotConverged])
+def test_a_scene_hangs_whose_end_became_another_error(kind: type[Exception]) -> None:
+    """Compiled code returns all the same; Python then raises an error, and the solver its own."""
 
     def run() -> None:
         try:
             while True:
                 sum(range(1000))
-        except BaseException as late:
-            raise SystemError("returned a result with an exception set") from late
+        except BaseException as hung:
+            error = SystemError("returned a result with an exception set")
+            error.__cause__ = hung
+            raise kind("no state was found") from error
 
     assert end(run, 0.05, judge=right) is Verdict.HUNG
 

@@ -132,12 +132,14 @@ def attempt(name: str, scene: Scene, patience: float = PATIENCE) -> Trial:
         verdict, message = Verdict.HUNG, str(late)
     except ModelError as error:
         verdict, message = _refused(scene, str(error)), f"ModelError: {error}"
-    except NotConverged as error:
-        verdict, message = _stopped(scene, error), f"{type(error).__name__}: {error}"
-    except Exception as error:  # whatever else comes out is the fault looked for
-        late = isinstance(error.__cause__, Hung)  # in compiled code, which returns all the same
-        verdict = Verdict.HUNG if late else Verdict.CRASHED
+    except Exception as error:  # whatever is not declared is the fault looked for
         message = f"{type(error).__name__}: {error}"
+        if _of_hung(error):
+            verdict = Verdict.HUNG
+        elif isinstance(error, NotConverged):
+            verdict = _stopped(scene, error)
+        else:
+            verdict = Verdict.CRASHED
     return Trial(
         name=name,
         what=scene.what,
@@ -146,6 +148,11 @@ def attempt(name: str, scene: Scene, patience: float = PATIENCE) -> Trial:
         seconds=time.process_time() - started,
         figures=figures,
     )
+
+
+def _of_hung(error: BaseException | None) -> bool:
+    """Whether an error comes of `Hung`: compiled code returns all the same, and Python objects."""
+    return error is not None and (isinstance(error, Hung) or _of_hung(error.__cause__))
 
 
 def _answered(scene: Scene, figures: Figures) -> tuple[Verdict, str]:

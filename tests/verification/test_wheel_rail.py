@@ -11,7 +11,7 @@ from scipy.optimize import fsolve
 from scipy.spatial import cKDTree
 
 from solver import ModelError, NotConverged, Record
-from solver.errors import WindowTooSmall
+from solver.errors import LimitLoad, TooLong, WindowTooSmall
 from solver.results.mesh_fields import to_meshio
 from solver.results.record import Status
 from solver.results.shakedown import ShakedownState
@@ -211,25 +211,62 @@ def test_a_zone_that_is_too_small_is_begun_again(monkeypatch: pytest.MonkeyPatch
     assert record.scalars["max_plastic_strain"] == free().scalars["max_plastic_strain"]
 
 
-def test_an_easier_pass_too_large_for_the_largest_zone_ends_the_run(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Not the draft alone, of which the standard elements would take ten times as long."""
+def searched(
+    monkeypatch: pytest.MonkeyPatch, own: NotConverged, eased: NotConverged, reaches: Any
+) -> tuple[Record, list[float]]:
+    """Return the record of passes that fail so, and their tolerances; without hardening."""
     tolerances: list[float] = []
 
     def lost(*_: Any, tolerance: float, **__: Any) -> NoReturn:
         tolerances.append(tolerance)
-        if tolerance == TOLERANCE:
-            raise NotConverged("no steady pass was found")
-        raise WindowTooSmall("the window is too small around for a steady pass")
+        raise own if tolerance == TOLERANCE else eased
 
-    monkeypatch.setattr("solver.rolling.scenes.rail_passes.REACHES", (0.6,))
+    monkeypatch.setattr("solver.rolling.scenes.rail_passes.REACHES", reaches)
     monkeypatch.setattr("solver.rolling.search.passing", lost)
+    monkeypatch.setattr("solver.rolling.scenes.rail_passes._TRIED", {})
     (record,) = SCENE.path(SCENE.parameters(**PUBLISHED), [1], lambda share: None)
+    return record, tolerances
+
+
+LOST, SMALL = NotConverged("no steady pass was found"), WindowTooSmall("the window is too small")
+
+
+def test_an_easier_pass_too_large_for_a_zone_is_tried_in_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In the largest zone the run ends: finer elements would not help."""
+    record, tolerances = searched(monkeypatch, LOST, SMALL, (0.6, 0.7))
     assert record.status is Status.NOT_CONVERGED
-    assert "around for a steady pass, in the largest zone, " in record.message
+    assert "the window is too small, in the largest zone, " in record.message
     assert record.message.endswith("; lower the load")
-    assert tolerances[0] == TOLERANCE != tolerances[1] and len(tolerances) == 2
+    assert len(tolerances) == 4
+    assert tolerances[0] == tolerances[2] == TOLERANCE != tolerances[1] == tolerances[3]
+
+
+def test_a_limit_load_in_the_largest_zone_is_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The easier pass has its error, and is tried in both zones."""
+    limit = LimitLoad("plastic strain grows without bound")
+    record, tolerances = searched(monkeypatch, limit, SMALL, (0.6, 0.7))
+    assert record.status is Status.LIMIT_LOAD
+    assert len(tolerances) == 4
+
+
+@pytest.mark.parametrize("eased", [TooLong("too many solves"), LOST])
+def test_easier_passes_that_are_lost_prove_nothing(
+    monkeypatch: pytest.MonkeyPatch, eased: NotConverged
+) -> None:
+    record, _ = searched(monkeypatch, LOST, eased, (0.6, 0.7))
+    assert "no steady pass was found" in record.message
+
+
+@pytest.mark.long
+def test_a_heavy_load_without_hardening_has_an_equilibrium() -> None:
+    """An easier pass needs the second zone; in the first one the pass itself seems lost."""
+    given = {"accuracy": "draft", "hardening": "none", "load": 372.6e3, "lateral_position": -7.0}
+    parameters = WheelRailParameters(friction=0.0, **given)
+    (record,) = SCENE.path(parameters, [1], lambda share: None)
+    assert record.status is Status.OK
+    assert record.scalars["max_plastic_strain"] == pytest.approx(0.017, rel=0.05)
 
 
 @pytest.mark.parametrize("distance", [29.0, 30.0, 120.0])

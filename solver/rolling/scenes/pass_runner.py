@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 
 from solver.audit.report import Audit
-from solver.errors import ModelError, NotConverged, WindowTooSmall
+from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.late import Late
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
@@ -167,6 +167,9 @@ class _Path:
         self._beside: list[_Path] = []
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
+        self._limit: LimitLoad | None = (
+            None  # of a smaller window; a pass in a larger one refutes it
+        )
 
     @property
     def seconds(self) -> float:
@@ -196,7 +199,7 @@ class _Path:
     def _take(self, found: Pass[Any]) -> None:
         """Go on to a pass that is found."""
         self._left = self._found.left if self._found else self._left
-        self._found = found
+        self._found, self._limit = found, None
         self._steps.append(max(found.steps, 1))
         self._traces.append(self._passes.trace(found))
         last, number = found, len(self._steps) - 1
@@ -240,6 +243,8 @@ class _Path:
                     return
         except NotConverged as failure:
             self.error = failure
+            if isinstance(failure.__cause__, LimitLoad):
+                self._limit = failure.__cause__
 
     def finished(self, run: Any) -> FinishedRun:
         """Return a run with the results of the last pass found."""
@@ -290,7 +295,9 @@ class _Path:
         return partial(self._family.values, runs) if self._family else None
 
     def _reported(self) -> NotConverged | None:
-        """Return the error, with the size of the window that is too small."""
+        """Return the error: a limit load, or the window that is too small with its size."""
+        if isinstance(self.error, WindowTooSmall) and self._limit:
+            return self._limit
         if isinstance(self.error, WindowTooSmall) and self._passes.extent:
             return WindowTooSmall(f"{self.error}, in the largest zone, {self._passes.extent}")
         return self.error

@@ -148,8 +148,8 @@ class RailPasses(Passes):
         are nearly the same, it begins with the strain of the last pass; while passes still yield,
         that guess is worse, and after another load it does not converge.
 
-        In the largest window an easier pass that needs a larger one ends the search: finer elements
-        would not help.
+        If an easier pass needs a larger window, that is tried. In the largest one the run ends:
+        finer elements would not help.
         """
         track, law, first = self._track, self.law, self._first
         before, guess, start = self._before or track.virgin(law), self._guess, self._start
@@ -159,7 +159,7 @@ class RailPasses(Passes):
             with one_thread():
                 found = search(
                     track, law, load, before, guess if load is last else None,
-                    start=start, budget=budget, wider=self._reach == REACHES[-1],
+                    start=start, budget=budget, wider=False,
                 )  # fmt: skip
             budget.renew()
             before, start, last = found.after, found.loading.start, load
