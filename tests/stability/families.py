@@ -92,7 +92,7 @@ FAMILIES: dict[str, Family] = {
     "rigid": Family(range(rigid.COUNT), 60, rigid.scenes),
     "static": Family(range(static.COUNT), 48, static.scenes),
     "stretched": Family(range(stretched.COUNT), 60, stretched.scenes),
-    "deep": Family(range(deep.COUNT), 60, deep.scenes),
+    "deep": Family(deep.SHORT, 60, deep.scenes),
     "endless": Family(endless.SHORT, 300, endless.scenes),
     "files": Family(range(files.COUNT), 200, files.scenes),
     "prism": Family(range(prism.COUNT), 300, prism.scenes),
@@ -124,5 +124,5 @@ def scene(name: str) -> Scene:
     """Return a scene by its name, ``family-number``."""
     family, _, number = name.rpartition("-")
     own = FAMILIES[family]
-    few = own.short[-1] + 1 if own.short else 0
+    few = own.short[-1] + 1
     return _made(family, few if int(number) < few else own.long)[int(number)]

@@ -23,8 +23,8 @@ from tests.stability.kinds.looked_at import looked_at
 from tests.stability.trial import Figure
 from tests.stability.trial import Scene as Trial
 
-COUNT = 0
-"""Scenes that the test suite runs: none, each takes some seconds."""
+SHORT = (2,)
+"""Scene of the test suite: a cone. Each takes some seconds."""
 SEED = 1908
 _REMEDY = ("reduce", "lower", "refine", "smaller", "larger", "harden", "more", "prescribe", "raise")
 """Words of a message that says what helps."""
@@ -105,7 +105,7 @@ _KINDS = {"ball": _ball, "punch": _punch, "cone": _cone, "fillet": _fillet, "man
 _HARDENING = ("none", "isotropic", "kinematic", "mixed")
 
 
-def scenes(count: int = COUNT) -> list[Trial]:
+def scenes(count: int) -> list[Trial]:
     """Return scenes of all kinds in turn."""
     rng, made = np.random.default_rng(SEED), list[Trial]()
     for number in range(count):
