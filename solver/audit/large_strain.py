@@ -185,15 +185,14 @@ class _Deformed:
             found = system.state(self.name, converged)
             self.stress, plastic = found.stress, found.plastic
         self.plastic = plastic
-        counts = plain.remaining(state.time) > GHOST
+        known = plain.remaining(state.time) > GHOST
         for point in system.model.singular:
-            counts &= ~point.reaches(plain.points)
-        large = plain.body.large_elements
-        known = counts
+            known &= ~point.reaches(plain.points)
+        large, volume = plain.body.large_elements, plain.volume.ravel()
         counts = known & ~np.repeat(large, plain.volume.shape[1])
-        self.volume = np.where(counts, plain.volume.ravel(), 0.0)
+        self.volume = np.where(counts, volume, 0.0)
         self.added: Array = np.zeros_like(self.stress) if before is None else before.added
-        own = self.elasticity.energy_density(self.stress) @ np.where(known, plain.volume.ravel(), 0)
+        own = self.elasticity.energy_density(self.stress) @ np.where(known, volume, 0.0)
         self.most: float = max(float(own), 0.0 if before is None else before.most)
         self.tangent: PartResponse | None = None
         if large.all():

@@ -48,11 +48,15 @@ class Deformation:
         """Whether strain is linear in displacements, at all points () or at each (n_points,)."""
         return np.array(True)
 
-    def within(self, elements: Bools, dofs: Ints, n: int) -> Deformation:
-        """Return some elements (n_elements,) before loading; ``dofs`` are theirs, of n unknowns."""
-        B, weights = self.B[elements], self.weights[elements]
+    @staticmethod
+    def small(n: int, dofs: Ints, B: Array, weights: Array) -> Deformation:
+        """Return a body of small strain before loading."""
         at_rest = np.zeros((B.shape[2], weights.size))
         return Deformation(n=n, dofs=dofs, strain=at_rest, B=B, weights=weights)
+
+    def within(self, elements: Bools, dofs: Ints, n: int) -> Deformation:
+        """Return some elements (n_elements,) before loading; ``dofs`` are theirs, of n unknowns."""
+        return self.small(n, dofs, self.B[elements], self.weights[elements])
 
     @property
     def _flat(self) -> Array:

@@ -92,8 +92,7 @@ class Discretisation(Nodes, Part):
         """
         B = strain_operator(values, gradients, self.points[0], self.body.kinematics)
         B = mean_dilatation(B, self.weights) if mean else B
-        at_rest = np.zeros((self.components, self.weights.size))
-        return Deformation(n=self.n, dofs=self.dofs, strain=at_rest, B=B, weights=self.weights)
+        return Deformation.small(self.n, self.dofs, B, self.weights)
 
     def _hold(self) -> None:
         """Find the held unknowns, the free rigid motions, and one pin for each of these."""

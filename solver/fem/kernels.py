@@ -87,6 +87,19 @@ def _by_gradient(xx: float, xy: float, yx: float, yy: float, Q: Array) -> None:
     Q[2, 0], Q[2, 1], Q[2, 2], Q[2, 3] = xy, a, d, yx
 
 
+@njit(cache=True, error_model="numpy")
+def _level(X: Array, weights: Array) -> None:
+    """Give the trace of X (4, n_points), Mandel, its mean at all points of an element."""
+    average = 0.0
+    for p in range(len(weights)):
+        average += weights[p] * (X[0, p] + X[1, p] + X[2, p])
+    average /= weights.sum()
+    for p in range(len(weights)):
+        off = (average - X[0, p] - X[1, p] - X[2, p]) / 3
+        for a in range(3):
+            X[a, p] += off
+
+
 @njit([(_POINTS, _PLANE, _PLANE, boolean, _SOLID, _POINTS)], cache=True, error_model="numpy")
 def strains(g: Array, u: Array, weights: Array, mean: bool, E: Array, B: Array) -> None:
     """Set the Mandel strain E (4, n_elements, n_points) and its derivative B by the unknowns.
@@ -120,26 +133,9 @@ def strains(g: Array, u: Array, weights: Array, mean: bool, E: Array, B: Array) 
                         total += A[a, j] * g[e, p, j, i]
                     B[e, p, a, i] = total
         if mean:
-            whole = weights[e].sum()
-            for i in range(-1, m):
-                average = 0.0
-                for p in range(points):
-                    trace = (
-                        E[0, e, p] + E[1, e, p] + E[2, e, p]
-                        if i < 0
-                        else B[e, p, 0, i] + B[e, p, 1, i] + B[e, p, 2, i]
-                    )
-                    average += weights[e, p] * trace
-                average /= whole
-                for p in range(points):
-                    if i < 0:
-                        off = (average - E[0, e, p] - E[1, e, p] - E[2, e, p]) / 3
-                        for a in range(3):
-                            E[a, e, p] += off
-                    else:
-                        off = (average - B[e, p, 0, i] - B[e, p, 1, i] - B[e, p, 2, i]) / 3
-                        for a in range(3):
-                            B[e, p, a, i] += off
+            _level(E[:, e], weights[e])
+            for i in range(m):
+                _level(B[e, :, :, i].T, weights[e])
 
 
 @njit(cache=True, error_model="numpy")

@@ -139,7 +139,9 @@ class Body:
 
     def turns(self, load: Load) -> bool:
         """Whether a load follows the deformation of its boundaries, where strain is large."""
-        facets = [self.facets(boundary) for boundary in load.boundaries if load.follows]
+        if not (self.large and load.follows):
+            return False
+        facets = map(self.facets, load.boundaries)
         return any(self.large_elements[self.mesh.f2t[0, own]].any() for own in facets)
 
     @property

@@ -173,10 +173,9 @@ class Solution:
         for name, value in {"beyond": beyond, "layers": layers}.items():
             if not value >= 0:
                 raise ModelError(name, value, "must be at least 0")
-        whole, most = self.system.full(self._known(body)), np.zeros(0)
-        for converged in self.stages.values():
-            strain = principal(self.system.state(body, converged).strain)[0]
-            most = np.maximum(np.abs(strain).max(axis=0), most if len(most) else 0.0)
+        whole = self.system.full(self._known(body))
+        states = [self.system.state(body, converged) for converged in self.stages.values()]
+        most = np.max([np.abs(principal(state.strain)[0]) for state in states], axis=(0, 1))
         reached = (most.reshape(whole.weights.shape) > beyond).any(axis=1)
         return np.flatnonzero(layered(whole, np.asarray(reached), layers))
 

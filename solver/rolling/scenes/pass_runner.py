@@ -167,9 +167,8 @@ class _Path:
         self._beside: list[_Path] = []
         self._budget = SolveBudget()
         self.error: NotConverged | None = None
-        self._limit: LimitLoad | None = (
-            None  # of a smaller window; a pass in a larger one refutes it
-        )
+        # of a smaller window: a pass in a larger one refutes it
+        self._limit: LimitLoad | None = None
 
     @property
     def seconds(self) -> float:

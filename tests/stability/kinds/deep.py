@@ -7,7 +7,6 @@ there is none, the record must say why and what helps.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -116,5 +115,5 @@ def scenes(count: int) -> list[Trial]:
             given["friction"] = float(rng.choice([0.0, 0.1, 0.4]))
         what = ", ".join(f"{key} {value}" for key, value in given.items())
         solve = Deep(name=name, parameters=given).solve
-        made.append(Trial(what=f"{name}: {what}", run=partial(solve), judge=judge))
+        made.append(Trial(what=f"{name}: {what}", run=solve, judge=judge))
     return made
