@@ -47,9 +47,10 @@ def opened_range(largest: Array, smallest: Array) -> Array:
 
 
 def arrest(lengths: Array, opened: Array, threshold: float) -> tuple[float, float]:
-    """Return the length at which a crack that grows stops, NaN if it never does; smallest range.
+    """Return the length at which a crack that grows stops, and the smallest range before.
 
-    Both are of the lengths before the first whose range is not known.
+    It is infinite if the crack grows through all lengths, and NaN if it reaches one whose range is
+    not known. The smallest range is that of the lengths before this one.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def arrest(lengths: Array, opened: Array, threshold: float) -> tuple[float, floa
     known = opened[: np.isnan(np.append(opened, np.nan)).argmax()]
     least = float(known.min()) if known.size else np.nan
     if not least < threshold:
-        return np.nan, least
+        return np.inf if known.size == len(opened) else np.nan, least
     k = int((known < threshold).argmax())
     around = slice(max(k - 1, 0), k + 1)
     return float(np.interp(-threshold, -known[around], lengths[around])), least

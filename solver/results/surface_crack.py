@@ -25,7 +25,11 @@ LINES = tuple(
     declare(f"crack_K_{name}", f"{name}{of} K of a surface crack", _UNIT, dims=("depth",))
     for name, of in {"largest": "", "smallest": "", "range": " of open"}.items()
 )
-ARREST = declare("crack_arrest_depth", "depth at which a crack that grows stops", "mm")
+ARREST = declare(
+    "crack_arrest_depth",
+    "depth at which a crack that grows stops; infinite if not in the profile, NaN if not known",
+    "mm",
+)
 LEAST = declare("crack_least_range", "smallest range of K as a crack grows", _UNIT)
 
 

@@ -111,9 +111,7 @@ def by_increments(
     last = given[-1] if given is not None else largest
     system = System(scene.model(last))
     samples = Samples(system, scene.view(last))
-    for output in scene.outputs:
-        if hasattr(output, "before"):
-            output.before(last, system, samples.view)
+    scene.refuse(last, samples)
     family = _Family(scene.derivatives, scene, last, system, samples) if scene.derivatives else None
     program = family.program if family else scene.program
     watch = partial(scene.watch, last, samples) if scene.watch else None

@@ -187,6 +187,18 @@ class Scene:
             yield replace(self.record(run), parameters=each)
         monitor(1.0)
 
+    def refuse(self, parameters: Any, samples: Any) -> None:
+        """Refuse outputs that runs in these `Samples` cannot have, before they are computed.
+
+        Raises
+        ------
+        ModelError
+            that names the entry
+        """
+        for output in self.outputs:
+            if hasattr(output, "before"):
+                output.before(parameters, samples.system, samples.view)
+
     @property
     def known_quantities(self) -> Mapping[str, Quantity]:
         """The quantities that its runs may have, by name."""

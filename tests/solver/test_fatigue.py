@@ -436,7 +436,7 @@ def test_a_residual_compression_closes_a_crack_and_holds_it() -> None:
     assert np.interp(stop, a, opened) == pytest.approx(20.0)
     alone = stress_intensity(depth, load, a)
     stop, least = arrest(a, alone, 20.0)
-    assert np.isnan(stop) and least == alone[0]
+    assert stop == np.inf and least == alone[0]
     with pytest.raises(ModelError, match="lengths"):
         stress_intensity(depth, load, np.array([4.0]))
 
@@ -447,7 +447,7 @@ def test_a_residual_compression_closes_a_crack_and_holds_it() -> None:
         ([9, 7, 3, 8], (2.5, 3)),  # 5 lies halfway from 7 to 3
         ([5, 4, 8, 8], (1.0, 4)),  # begins at the threshold, then falls
         ([4, 9, 3, 8], (1.0, 3)),  # never grows
-        ([9, 7, 8, 5], (np.nan, 5)),  # never stops
+        ([9, 7, 8, 5], (np.inf, 5)),  # never stops
         ([9, 7, np.nan, 1], (np.nan, 7)),  # not known before it stops
         ([9, 4, np.nan, 9], (1.8, 4)),  # stops before
         ([np.nan, 7, 1, 1], (np.nan, np.nan)),

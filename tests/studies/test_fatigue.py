@@ -288,6 +288,29 @@ def test_a_crack_outside_a_body_is_refused_before_the_first_increment() -> None:
 
 
 @pytest.mark.solves
+@pytest.mark.parametrize("scene", ["rolling", "raceway", "wheel_rail"])
+def test_a_crack_outside_a_body_is_refused_before_the_first_pass(scene: str) -> None:
+    content = {"name": "far", "scene": scene, "parameters": {"accuracy": "draft"}}
+    deep = Study.from_dict(content | {"fatigue": {"crack": CRACK | {"at": 1e6}}})
+    begun: list[float] = []
+    problem, (case,), (path,) = deep.problem, deep.cases(), deep.paths()
+    with pytest.raises(ModelError, match=r"fatigue\.crack\.at = 1000000\.0: must be on"):
+        list(problem.path(path.parameters, [case.values[problem.branch]], begun.append))
+    assert not begun
+
+
+@pytest.mark.solves
+def test_a_crack_that_nothing_holds_has_an_infinite_depth() -> None:
+    """Pulled without residual stress it grows through the profile; NaN is of K not known."""
+    content = held("top", initial=1.0)
+    content["loads"] = content["loads"][1:]
+    scene = built(content)
+    (record,) = scene.path(scene.parameters(), [], lambda done: None)
+    assert record.scalars["crack_arrest_depth"] == np.inf
+    assert record.scalars["crack_applies"] == Applies.APPLICABLE
+
+
+@pytest.mark.solves
 def test_k_of_a_cycle_that_strains_plastically_is_not_applicable() -> None:
     """At the default parameters of the scene, 2.7 of the yield stress without hardening."""
     content = {"name": "default", "scene": "rolling", "fatigue": {"crack": CRACK}}
@@ -295,6 +318,7 @@ def test_k_of_a_cycle_that_strains_plastically_is_not_applicable() -> None:
     assert record.scalars["crack_applies"] == Applies.NOT_APPLICABLE
     assert record.scalars["fatigue_plastic_strain"] > 1e-4
     assert np.isnan(record.fields["crack_K_range"][1]).all()
+    assert np.isnan(record.scalars["crack_arrest_depth"])
     elastic = record_of(rolled({"crack": CRACK}, load_ratio=0.8))
     assert elastic.scalars["crack_applies"] == Applies.APPLICABLE
 

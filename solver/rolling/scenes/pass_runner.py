@@ -177,6 +177,7 @@ class _Path:
 
     def _begin(self, reach: float) -> None:
         self._reach, self._passes = reach, self._window(self._last, self._view, reach)
+        self._scene.refuse(self._last, self._passes.shown(0)[0])
         self._steps: list[int] = []
         self._traces: list[Any] = []
         self._found: Pass[Any] | None = None
