@@ -148,6 +148,26 @@ def paths_of(kind: str, count: int = 60) -> Array:
     return size[0] + sum(waves)
 
 
+def test_paths_that_reverse_in_proportion_are_closed_forms() -> None:
+    """Of principal amplitudes 1 to 3: Mohr's outer circle has the largest shear and normal stress.
+
+    Crossland sqrt(J2) + a |p|, Dang Van r + a |p|, Matake r + k |c|, and Findley
+    r sqrt(1 + k^2) + k |c|, with r = (s1 - s3) / 2 and c = (s1 + s3) / 2.
+    """
+    amplitude = paths_of("few instants", 200)[:, :1]
+    s = np.linalg.eigvalsh(amplitude[:, 0, _FULL])
+    p, r, c = s.mean(axis=1), (s[:, 2] - s[:, 0]) / 2, np.abs(s[:, 2] + s[:, 0]) / 2
+    root = np.sqrt(((s - p[:, None]) ** 2).sum(axis=1) / 2)
+    k, paths = 0.3, Paths(amplitude * np.sin(np.linspace(0.0, 2 * np.pi, 13))[:, None])
+    for criterion, value in {
+        Crossland(torsion=1.0, sensitivity=k): root + k * np.abs(p),
+        DangVan(torsion=1.0, sensitivity=k): r + k * np.abs(p),
+        Matake(torsion=1.0, sensitivity=k): r + k * c,
+        Findley(torsion=1.0, sensitivity=k): r * np.sqrt(1 + k**2) + k * c,
+    }.items():
+        np.testing.assert_allclose(criterion.assess(paths).value, value, rtol=1e-6)
+
+
 @pytest.mark.parametrize("kind", ["in phase", "pulled", "few instants", "out of phase"])
 @pytest.mark.parametrize("criterion", EVERY, ids=lambda each: type(each).__name__)
 def test_rotation_changes_nothing(criterion: Criterion, kind: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,10 @@ import pytest
 
 from solver.errors import ModelError
 from solver.fatigue import DangVan, Findley, Paths, stress_intensity
-from solver.results.fatigue import Applies
+from solver.results.fatigue import Applies, Fatigue
 from studies import Study, StudyError, to_dataframe
 from studies.scenes.entries import assessed
+from tests.architecture.sources import ROOT
 from tests.studies.scenes.conftest import blocks, built
 
 DANG_VAN = {"criterion": "dang_van", "limits": {"torsion": 200.0, "sensitivity": 0.3}}
@@ -61,6 +63,48 @@ def test_residual_stress_counts_unless_it_is_left_out() -> None:
     without = record_of(rolled(DANG_VAN | {"residual": False}, load_ratio=2.0, passes=4))
     both = [each.scalars["fatigue_safety_factor"] for each in (with_it, without)]
     assert both[0] > 1.03 * both[1]
+
+
+@pytest.mark.solves
+@pytest.mark.parametrize(("hardening", "factors"), [("kinematic", (1.866, 1.714)), ("none", ())])
+def test_ten_passes_have_the_factors_of_the_study_of_the_package(
+    hardening: str, factors: tuple[float, ...]
+) -> None:
+    """At 2 yield stresses and friction .1; without hardening the tenth pass still strains."""
+    given = {"load_ratio": 2.0, "friction": 0.1, "hardening": hardening}
+    found = []
+    for name in ("rolling-fatigue", "rolling-fatigue-alone"):
+        content = Study.from_toml(ROOT / "data" / "studies" / f"{name}.toml").to_dict()
+        content["parameters"] |= given
+        del content["sweep"]
+        record = record_of(Study.from_dict(content))
+        if record.scalars["fatigue_applies"] == Applies.APPLICABLE:
+            found.append(round(record.scalars["fatigue_safety_factor"], 3))
+    assert tuple(found) == factors
+
+
+@pytest.mark.solves
+@pytest.mark.parametrize("criterion", ["dang_van", "findley", "fatemi_socie"])
+def test_a_criterion_adds_less_than_a_second_to_a_run(
+    criterion: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of processor time, under a punch and along the rows of a raceway."""
+    spent: list[float] = []
+
+    def timed(self: Fatigue, *given: Any) -> Any:
+        begun = time.process_time()
+        values = found(self, *given)
+        spent.append(time.process_time() - begun)
+        return values
+
+    limits = {} if criterion == "fatemi_socie" else DANG_VAN["limits"]
+    found = Fatigue.__call__
+    monkeypatch.setattr(Fatigue, "__call__", timed)
+    for scene in ("raceway", "punch"):
+        content = {"name": "timed", "scene": scene, "parameters": {"accuracy": "draft"}}
+        table = {"criterion": criterion, "limits": limits}
+        record_of(Study.from_dict(content | {"fatigue": table}))
+    assert len(spent) == 2 and max(spent) < 1.0
 
 
 @pytest.mark.solves
