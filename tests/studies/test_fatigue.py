@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from solver.errors import ModelError
 from solver.fatigue import DangVan, Findley, Paths, stress_intensity
-from solver.results.fatigue import Applies, Fatigue
+from solver.results.fatigue import Applies
 from studies import Study, StudyError, to_dataframe
 from studies.scenes.entries import assessed
 from tests.architecture.sources import ROOT
@@ -81,30 +80,6 @@ def test_ten_passes_have_the_factors_of_the_study_of_the_package(
         if record.scalars["fatigue_applies"] == Applies.APPLICABLE:
             found.append(round(record.scalars["fatigue_safety_factor"], 3))
     assert tuple(found) == factors
-
-
-@pytest.mark.solves
-@pytest.mark.parametrize("criterion", ["dang_van", "findley", "fatemi_socie"])
-def test_a_criterion_adds_less_than_a_second_to_a_run(
-    criterion: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of processor time, under a punch and along the rows of a raceway."""
-    spent: list[float] = []
-
-    def timed(self: Fatigue, *given: Any) -> Any:
-        begun = time.process_time()
-        values = found(self, *given)
-        spent.append(time.process_time() - begun)
-        return values
-
-    limits = {} if criterion == "fatemi_socie" else DANG_VAN["limits"]
-    found = Fatigue.__call__
-    monkeypatch.setattr(Fatigue, "__call__", timed)
-    for scene in ("raceway", "punch"):
-        content = {"name": "timed", "scene": scene, "parameters": {"accuracy": "draft"}}
-        table = {"criterion": criterion, "limits": limits}
-        record_of(Study.from_dict(content | {"fatigue": table}))
-    assert len(spent) == 2 and max(spent) < 1.0
 
 
 @pytest.mark.solves
