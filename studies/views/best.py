@@ -37,7 +37,7 @@ def _columns(dataset: xr.Dataset) -> Iterator[Column]:
 
 def _column(values: xr.DataArray, status: xr.DataArray, group: str) -> Column:
     """Return a column with a value for each run, also of a variable that not all axes change."""
-    whole, _ = xr.broadcast(values, status)
+    whole = values if values.dims == status.dims else xr.broadcast(values, status)[0]
     return column_over(values, whole.transpose(*status.dims).to_numpy().ravel(), group)
 
 

@@ -406,7 +406,6 @@ def _finished(
 def _fit(sheet: Figure, axes: Axes) -> None:
     """Fit the size of the figure to all that is drawn, without changing the size of the axes."""
     size = sheet.get_size_inches()
-    sheet.draw_without_rendering()
     ink = sheet.get_tightbbox().padded(0.1)
     sheet.set_size_inches(ink.width, ink.height)
     axes.set_position(
