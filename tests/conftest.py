@@ -47,7 +47,6 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> Order |
 @pytest.hookimpl(trylast=True)
 def pytest_collection_finish() -> None:
     """Keep the thousands of collected tests out of each search for garbage: 2 % of all time."""
-    gc.collect()
     gc.freeze()
     gc.enable()
 

@@ -3,9 +3,9 @@
 ``solves`` is for tests that compute a state of a model, ``processes`` for tests that start another
 process, ``pages`` for tests that run the code of a page or an example, which may do both.
 
-``long`` is for tests of a figure that take more than 4 s of CPU, or start services and wait for
-more than 10 s, and have a quicker neighbour which runs the same code: ``make test`` and
-``make check`` leave them out, ``make stress`` runs them.
+``long`` is for tests of a figure that take more than 4 s of CPU, make the claim of a neighbour for
+one more case, or start services and wait for more than 10 s, and have a quicker neighbour which
+runs the same code: ``make test`` and ``make check`` leave them out, ``make stress`` runs them.
 
 In the folders `UNDIVIDED` a test without the mark ``divides`` solves in the increments that it
 gives, which takes half the time. In all others the program divides them as for its users.
@@ -17,7 +17,9 @@ import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import pytest
@@ -68,9 +70,16 @@ def allowed(marks: set[str]) -> Iterator[None]:
         if "divides" not in marks and "solves" in marks:
             undivided(patch)
         for mark in EXPENSIVE.keys() - marks if "pages" not in marks else ():
-            for name in EXPENSIVE[mark]:
-                patch.setattr(name, refusal(mark))
+            for owner, name in owners(mark):
+                patch.setattr(owner, name, refusal(mark))
         yield
+
+
+@cache
+def owners(mark: str) -> list[tuple[Any, str]]:
+    """Return the modules and classes that have the functions of a mark, with their names."""
+    parted = (name.rpartition(".") for name in EXPENSIVE[mark])
+    return [(resolve_name(owner), name) for owner, _, name in parted]
 
 
 def undivided(patch: pytest.MonkeyPatch) -> None:
