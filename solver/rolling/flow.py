@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -41,9 +40,7 @@ PARTS = 16
 their length. Under a braked wheel at draft accuracy the error of residual stress is 2 MPa in 500;
 with four increments it is 8 to 9 MPa."""
 
-flow, flow_along, close, close_along = late(
-    "rolling.kernels", "flow", "flow_along", "close", "close_along"
-)
+flow, flow_along = late("rolling.kernels", "flow", "flow_along")
 
 
 class CompiledSweep:
@@ -86,41 +83,19 @@ class CompiledSweep:
             self.states.plastic_strain - flowed, self.states.accumulated - SQRT23 * last[..., n]
         )
 
-    def changes(self, added: Array) -> Array:
-        """Return the changes of plastic strain (n_rows, n_columns, n).
-
-        ``added`` is the change of strain (n_rows, n_columns, n) at the columns.
-        """
-        return self._changes(added)[0]
-
-    def _changes(self, added: Array) -> tuple[Array, Array]:
-        return flow_along(added, self._law, self._path, self._each)
-
-
-class CompiledFlow(CompiledSweep):
-    """A sweep in two dimensions, and the residual state of the half-plane that follows it.
-
-    ``after`` are the internal variables (..., n_rows) behind the load.
-    """
-
-    def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
-        super().__init__(law, strain, start, parts)
-        left, gathered, *self._closing = close(
-            np.ascontiguousarray(self.states.plastic_strain[..., -1].T),
-            self.states.accumulated[:, -1].copy(),
-            self._law,
-            law.elasticity.bulk_modulus,
-        )
-        self.after = PlasticState(left.T, gathered)
-
     def along(self, added: Array) -> tuple[Array, Array]:
-        """Return the changes of plastic strain (n_rows, n_columns, 4), and behind (n_rows, 4)."""
-        plastic, total = self._changes(added)
-        ends = np.ascontiguousarray(plastic[:, -1]), total[:, -1].copy()
-        return plastic, close_along(*ends, self._law, *self._closing)
+        """Return the changes of plastic strain (n_rows, n_columns, n), and of the last column.
+
+        The latter (n_rows, n_internal) are those of all internal variables, packed.
+
+        Parameters
+        ----------
+        added : (n_rows, n_columns, n) change of strain at the columns
+        """
+        plastic, total = flow_along(added, self._law, self._path, self._each)
+        return plastic, np.append(plastic[:, -1], total[:, -1:], axis=1)
 
 
-_NO_STATE = "the law has no state for the strains of a steady pass"
 _STEP = 1e-6
 """Step of differences over the largest value of a variable, or over the yield strain."""
 _AT_REST, _ALMOST = 1e-11, 1e-8
@@ -130,13 +105,6 @@ _CLOSING = 60
 """Largest number of steps of Newton's method for the state behind the load."""
 _FREE = np.array([1, 3])
 """Components yy and xy, whose strains follow from the condition that their stresses vanish."""
-
-
-class _Left(NamedTuple):
-    """The state of rows behind the load: internal variables, and strain (4, n_rows)."""
-
-    state: PlasticState
-    strain: Array
 
 
 class SteppedSweep:
@@ -165,21 +133,15 @@ class SteppedSweep:
                 now[:, at] = state.packed
                 self._ago[..., at, column] = ago.packed
             self._packed[..., column] = now
-        if not np.isfinite(self._packed).all():
-            raise NotConverged(_NO_STATE)
         self.states = start.unpacked(self._packed)
 
     @property
     def ago(self) -> PlasticState:
-        """Internal variables at the beginning of the last increment before each column."""
+        """See `CompiledSweep`."""
         return self._start.unpacked(self._ago)
 
-    def changes(self, added: Array) -> Array:
-        """Return the changes of plastic strain for a change of the strains."""
-        return self._changes(added)[0]
-
-    def _changes(self, added: Array) -> tuple[Array, Array]:
-        """Return the same, and changes (n_rows, n) of the last column's internal variables."""
+    def along(self, added: Array) -> tuple[Array, Array]:
+        """See `CompiledSweep`."""
         plastic = np.empty(added.shape)
         now = np.zeros(self._start.packed.shape).T
         for column, (at, slopes) in enumerate(zip(self._flowing, self._columns, strict=True)):
@@ -190,96 +152,99 @@ class SteppedSweep:
         return plastic, now
 
     @cached_property
-    def _scale(self) -> Array:
-        """Steps of differences (n + n_components,): of internal variables and of strain."""
-        largest = {
-            f.name: np.full_like(getattr(self._start, f.name), np.abs(values).max(initial=0.0))
-            for f in fields(self._start)
-            for values in [getattr(self.states, f.name)]
-        }
-        scale = replace(self._start, **largest).packed[:, 0]
-        yield_strain = self._law.yield_stress / self._law.elasticity.youngs_modulus
-        return _STEP * np.append(scale, [yield_strain] * len(self._strain))
-
-    def _slopes(self, before: Array, strain: Array) -> Array:
-        """Return the derivatives of internal variables (n_points, n, n + n_components).
-
-        They are those over an increment, by its beginning and by its strain.
-
-        Parameters
-        ----------
-        before : (n, n_points) internal variables at its beginning
-        strain : (n_components, n_points) at its end
-        """
-        n = len(before)
-        given = np.concatenate([before, strain])
-
-        def after(given: Array) -> Array:
-            return self._law.respond(given[n:], self._start.unpacked(given[:n])).state.packed
-
-        base = after(given)
-        out = np.zeros((before.shape[1], n, len(given)))
-        for k, step in enumerate(self._scale):
-            if step:  # a variable that is zero everywhere does not change
-                moved = given.copy()
-                moved[k] += step
-                out[:, :, k] = ((after(moved) - base) / step).T
-        return out
-
-    @cached_property
     def _columns(self) -> list[Array]:
         """Derivatives of the flowing rows in each column by previous variables and by strain."""
         upstream = np.concatenate([self._start.packed[..., None], self._packed[..., :-1]], axis=2)
         before = [upstream[:, at, column] for column, at in enumerate(self._flowing)]
         strain = [self._strain[:, at, column + 1] for column, at in enumerate(self._flowing)]
-        every = self._slopes(np.concatenate(before, axis=1), np.concatenate(strain, axis=1))
+        own = np.concatenate(before, axis=1), np.concatenate(strain, axis=1)
+        every = _slopes(self._law, self.states, *own)
         return np.split(every, np.cumsum([len(at) for at in self._flowing])[:-1])
 
 
-class LayeredSweep(SteppedSweep):
+class LayeredSweep:
     """Sweep of a layered material along rows, layer by layer; see `CompiledSweep`."""
 
     def __init__(self, law: Layered, strain: Array, start: PlasticState, parts: int) -> None:
-        self._law: Layered = law
-        self._start, self._strain = start, np.ascontiguousarray(np.moveaxis(strain, 2, 0))
+        self._law = law
         each = zip(law.layers, law.states(start), strict=True)
         self._layers = [CompiledSweep(own, strain, state, parts) for (_, own), state in each]
         self.states = law.together([layer.states for layer in self._layers])
-        self._packed = self.states.packed
-        if not np.isfinite(self._packed).all():
-            raise NotConverged(_NO_STATE)
 
     @property
     def ago(self) -> PlasticState:
-        """Internal variables at the beginning of the last increment before each column."""
+        """See `CompiledSweep`."""
         return self._law.together([layer.ago for layer in self._layers])
 
-    def _changes(self, added: Array) -> tuple[Array, Array]:
+    def along(self, added: Array) -> tuple[Array, Array]:
+        """See `CompiledSweep`."""
         plastic, ends = np.zeros(added.shape), []
         for (weight, _), layer in zip(self._law.layers, self._layers, strict=True):
-            own, total = layer._changes(added)
+            own, end = layer.along(added)
             plastic += weight * own
-            ends.append(PlasticState(own[:, -1].T, total[:, -1]))
+            ends.append(PlasticState(end[:, :-1].T, end[:, -1]))
         return plastic, self._law.together(ends).packed.T
 
 
-class SteppedFlow(SteppedSweep):
-    """Flow of a material with any law along rows; see `CompiledFlow`."""
+def _slopes(law: Law, states: PlasticState, before: Array, strain: Array) -> Array:
+    """Return the derivatives of internal variables (n_points, n, n + n_components), by differences.
+
+    They are those over an increment, by its beginning and by its strain.
+
+    Parameters
+    ----------
+    states : internal variables (..., n_rows, n_columns) of a sweep, for the steps of differences
+    before : (n, n_points) internal variables at its beginning
+    strain : (n_components, n_points) at its end
+    """
+    n, like = len(before), states.unpacked(states.packed[..., -1])
+    given = np.concatenate([before, strain])
+
+    def after(given: Array) -> Array:
+        return law.respond(given[n:], like.unpacked(given[:n])).state.packed
+
+    largest = {
+        f.name: np.full_like(getattr(like, f.name), np.abs(getattr(states, f.name)).max(initial=0))
+        for f in fields(like)
+    }
+    yield_strain = law.yield_stress / law.elasticity.youngs_modulus
+    scale = np.append(replace(like, **largest).packed[:, 0], [yield_strain] * len(strain))
+    base = after(given)
+    out = np.zeros((before.shape[1], n, len(given)))
+    for k, step in enumerate(_STEP * scale):
+        if step:  # a variable that is zero everywhere does not change
+            moved = given.copy()
+            moved[k] += step
+            out[:, :, k] = ((after(moved) - base) / step).T
+    return out
+
+
+class Flow:
+    """A sweep in two dimensions, and the residual state of the half-plane behind it.
+
+    Arguments are those of `sweep_of`.
+
+    Attributes
+    ----------
+    sweep : the sweep
+    after : internal variables (..., n_rows) behind the load
+    """
 
     def __init__(self, law: Law, strain: Array, start: PlasticState, parts: int) -> None:
-        super().__init__(law, strain, start, parts)
-        self._left = _at_rest(law, start.unpacked(self._packed[..., -1]))
-        self.after = self._left.state
+        self._law, self.sweep = law, sweep_of(law, strain, start, parts)
+        states = self.sweep.states
+        self._last = states.packed[..., -1]
+        self.after, self._strain = _at_rest(law, states.unpacked(self._last))
 
     def along(self, added: Array) -> tuple[Array, Array]:
-        """Return the changes of plastic strain for a change of the strains."""
-        plastic, end = self._changes(added)
+        """Return the changes of plastic strain (n_rows, n_columns, 4), and behind (n_rows, 4)."""
+        plastic, end = self.sweep.along(added)
         return plastic, np.matmul(self._closing, end[..., None])[..., 0]
 
     @cached_property
     def _closing(self) -> Array:
         """Derivative (n_rows, 4, n) of the plastic strain behind by the last column's variables."""
-        slopes = self._slopes(self._packed[..., -1], self._left.strain)[:, :4]
+        slopes = _slopes(self._law, self.sweep.states, self._last, self._strain)[:, :4]
         n = slopes.shape[2] - 4
         C = self._law.stiffness(4)
         by_state, by_strain = slopes[..., :n], slopes[..., n:]
@@ -287,12 +252,10 @@ class SteppedFlow(SteppedSweep):
         return by_state + by_strain[..., _FREE] @ _solved(stress[1], stress[0])
 
 
-class LayeredFlow(SteppedFlow, LayeredSweep):
-    """Flow of a layered material along rows: `SteppedFlow` behind a `LayeredSweep`."""
+def _at_rest(law: Law, state: PlasticState) -> tuple[PlasticState, Array]:
+    """Return internal variables and strain (4, n_rows) of rows behind the load, at rest.
 
-
-def _at_rest(law: Law, state: PlasticState) -> _Left:
-    """Return the state of rows behind the load, where no stress acts on planes y = const.
+    No stress acts on planes y = const.
 
     The strains along x and z return to zero in one increment. If the unloaded stress of a row is
     outside the yield surface, the row flows. This is the residual state of a half-plane, with 4
@@ -331,7 +294,7 @@ def _at_rest(law: Law, state: PlasticState) -> _Left:
         step[_FREE] = np.where(better, turned, step[_FREE])
     if not (least < _ALMOST * law.yield_stress).all():
         raise NotConverged("no residual state was found behind a steady pass")
-    return _Left(law.respond(found, state).state, found)
+    return law.respond(found, state).state, found
 
 
 def _solved(matrices: Array, right: Array) -> Array:
@@ -342,8 +305,7 @@ def _solved(matrices: Array, right: Array) -> Array:
         raise NotConverged("the residual state behind a steady pass has no stiffness") from None
 
 
-Sweep = CompiledSweep | SteppedSweep
-Flow = CompiledFlow | SteppedFlow
+Sweep = CompiledSweep | SteppedSweep | LayeredSweep
 
 
 def allowed_inflow(law: Law, most_added: float) -> float:
@@ -360,14 +322,19 @@ def sweep_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Sweep:
         the pass
     start : internal variables (..., n_rows) before the pass
     parts : number of equal increments of strain from one column to the next
+
+    Raises
+    ------
+    NotConverged
+        if the law has no state for these strains
     """
+    if law.linear_hardening:
+        return CompiledSweep(law, strain, start, parts)
+    found: LayeredSweep | SteppedSweep
     if type(law) is Layered:
-        return LayeredSweep(law, strain, start, parts)
-    return (CompiledSweep if law.linear_hardening else SteppedSweep)(law, strain, start, parts)
-
-
-def flow_of(law: Law, strain: Array, start: PlasticState, parts: int) -> Flow:
-    """Return the sweep and the residual state behind it; for arguments see `sweep_of`, n is 4."""
-    if type(law) is Layered:
-        return LayeredFlow(law, strain, start, parts)
-    return (CompiledFlow if law.linear_hardening else SteppedFlow)(law, strain, start, parts)
+        found = LayeredSweep(law, strain, start, parts)
+    else:
+        found = SteppedSweep(law, strain, start, parts)
+    if not np.isfinite(found.states.packed).all():
+        raise NotConverged("the law has no state for the strains of a steady pass")
+    return found

@@ -24,8 +24,6 @@ from solver.materials.radial_return import SQRT23
 from solver.typing import Array, Ints
 
 _Each = tuple[int, ...]
-_PLANE = (0, 0, 0, 0)
-"""One entry for each component in two dimensions."""
 _LINE, _TABLE = float64[::1], float64[:, ::1]
 _ROWS, _STEPS = float64[:, :, ::1], float64[:, :, :, ::1]
 _EACH = tuple(types.UniTuple(int64, n) for n in (4, 6))
@@ -177,87 +175,6 @@ def flow_along(strain: Array, law: Array, steps: Array, each: _Each) -> tuple[Ar
             flowed[row, column] = now
             total[row, column] = a
     return flowed, total
-
-
-@njit((_TABLE, _LINE, _LINE, float64), cache=True)
-def close(
-    plastic: Array, accumulated: Array, law: Array, bulk: float
-) -> tuple[Array, Array, Array, Array]:
-    """Return the state of rows behind the load, where no stress acts on planes y = const.
-
-    The strains along x and z return to zero. If the unloaded stress of a row is outside the yield
-    surface, the row flows. This is the residual state of a half-plane, with 4 components: of the
-    strains only yy and xy follow from stress.
-
-    Parameters
-    ----------
-    plastic, accumulated : (n_rows, 4) and (n_rows,) at the last column
-    law : as for `flow`
-    bulk : bulk modulus [MPa]
-
-    Returns
-    -------
-    plastic (n_rows, 4), accumulated (n_rows,), steps (n_rows, 6), inverses (n_rows, 2, 2) : the
-    last two for `close_along`
-    """
-    double_shear = law[0]
-    n_rows = len(plastic)
-    flowed, total = plastic.copy(), accumulated.copy()
-    steps, inverses = np.zeros((n_rows, 6)), np.zeros((n_rows, 2, 2))
-    e, now = np.zeros(4), np.empty(4)
-    along, unit = np.empty(4), np.zeros(4)
-    share = (bulk - double_shear / 3.0) / (bulk + 2.0 * double_shear / 3.0)
-    jacobian = np.empty((2, 2))
-    for row in range(n_rows):
-        e[1] = plastic[row, 1] + share * (plastic[row, 0] + plastic[row, 2])
-        e[3] = plastic[row, 3]
-        for _ in range(30):
-            now[:] = plastic[row]
-            total[row] = _return(e, now, accumulated[row], law, steps[row], _PLANE)
-            normal = bulk * e[1] + double_shear * (e[1] * 2.0 / 3.0 - now[1])
-            shear = double_shear * (e[3] - now[3])
-            for column in range(2):
-                at = 1 if column == 0 else 3
-                unit[:] = 0.0
-                unit[at] = 1.0
-                along[:] = 0.0
-                _return_along(unit, along, 0.0, law, steps[row], _PLANE)
-                whole = bulk + double_shear * 2.0 / 3.0 if column == 0 else 0.0
-                jacobian[0, column] = whole - double_shear * along[1]
-                jacobian[1, column] = (double_shear if column == 1 else 0.0) - double_shear * along[
-                    3
-                ]
-            inverses[row] = np.linalg.inv(jacobian)
-            if abs(normal) + abs(shear) < 1e-11 * law[4]:
-                break
-            e[1] -= inverses[row, 0, 0] * normal + inverses[row, 0, 1] * shear
-            e[3] -= inverses[row, 1, 0] * normal + inverses[row, 1, 1] * shear
-        flowed[row] = now
-    return flowed, total, steps, inverses
-
-
-@njit((_TABLE, _LINE, _LINE, _TABLE, _ROWS), cache=True)
-def close_along(
-    plastic: Array, accumulated: Array, law: Array, steps: Array, inverses: Array
-) -> Array:
-    """Return the change of the plastic strain (n_rows, 4) of `close`.
-
-    `plastic` (n_rows, 4) and `accumulated` (n_rows,) are the changes at the last column.
-    """
-    double_shear = law[0]
-    out = np.empty_like(plastic)
-    e, now = np.zeros(4), np.empty(4)
-    for row in range(len(plastic)):
-        e[:] = 0.0
-        now[:] = plastic[row]
-        _return_along(e, now, accumulated[row], law, steps[row], _PLANE)
-        normal, shear = -double_shear * now[1], -double_shear * now[3]
-        e[1] = -(inverses[row, 0, 0] * normal + inverses[row, 0, 1] * shear)
-        e[3] = -(inverses[row, 1, 0] * normal + inverses[row, 1, 1] * shear)
-        now[:] = plastic[row]
-        _return_along(e, now, accumulated[row], law, steps[row], _PLANE)
-        out[row] = now
-    return out
 
 
 @njit(

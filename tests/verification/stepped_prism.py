@@ -361,7 +361,7 @@ class _StandingFlow:
 
     def along(self, change: Array) -> Array:
         """Return the change of plastic strain (n_soft, 6) for one of strain at the soft points."""
-        return self._sweep.changes(change[:, None])[:, 0]
+        return self._sweep.along(change[:, None])[0][:, 0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,7 +29,7 @@ from solver.materials import (
 )
 from solver.rolling import flow
 from solver.rolling.audit.plane import audit_pass
-from solver.rolling.flow import CompiledFlow, SteppedFlow
+from solver.rolling.flow import CompiledSweep, SteppedSweep
 from solver.rolling.plane.rolling import rolling
 from solver.rolling.plane.rows import RowFlow
 from solver.rolling.plane.track import track_of, under_load
@@ -105,17 +105,17 @@ def test_rows_stepped_by_the_law_flow_as_the_compiled_ones(hardening, parts):
     before = passes(law, [1])[0].after
     at_rest = before.strain(ELASTIC)[:, None]
     strain = np.concatenate([at_rest, at_rest + added], axis=1)
-    compiled = CompiledFlow(law, strain, before.state, parts)
-    stepped = SteppedFlow(law, strain, before.state, parts)
+    compiled = CompiledSweep(law, strain, before.state, parts)
+    stepped = SteppedSweep(law, strain, before.state, parts)
     assert (compiled.states.accumulated[:, -1] > before.accumulated).any()
-    for name in ("states", "ago", "after"):
+    for name in ("states", "ago"):
         one, other = (getattr(each, name).packed for each in (compiled, stepped))
         np.testing.assert_allclose(one, other, atol=1e-15, err_msg=name)
 
 
 def _by_both(run, monkeypatch):
     compiled = run()
-    monkeypatch.setattr(flow, "flow_of", SteppedFlow)
+    monkeypatch.setattr(flow, "sweep_of", SteppedSweep)
     return zip(compiled, run(), strict=True)
 
 

@@ -20,7 +20,7 @@ from solver.linear import solvers as linear
 from solver.linear.schur import SchurComplement
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
-from solver.rolling.flow import Flow, allowed_inflow, flow_of
+from solver.rolling.flow import Flow, allowed_inflow
 from solver.rolling.load import FlowPast
 from solver.rolling.plane.layers import Layers
 from solver.typing import Array, Bools, Ints
@@ -231,7 +231,7 @@ class RowFlow(FlowPast[Layers]):
     def __init__(self, rows: FlowRows, law: Law, before: Layers, added: Array, parts: int) -> None:
         self._rows, self._law, self._added, self._parts = rows, law, added, parts
         self._flow = self._of(before, added)
-        super().__init__(law, before, self._flow)
+        super().__init__(law, before, self._flow.sweep)
         self.after = replace(before, state=self._flow.after)
         plastic = np.moveaxis(self.states.plastic_strain, 0, 2)
         self.force = rows.force(
@@ -247,13 +247,13 @@ class RowFlow(FlowPast[Layers]):
         """
         top = self._begin.top
         flow = self._of(top, self._rows.onto_surface(self._added))
-        return flow.states, replace(self.after, surface=replace(top, state=flow.after))
+        return flow.sweep.states, replace(self.after, surface=replace(top, state=flow.after))
 
     def _of(self, before: Layers, added: Array) -> Flow:
         """Return the flow along rows with these states before and these added strains."""
         at_rest = before.strain(self._law.elasticity)[:, None]
         strain = np.concatenate([at_rest, at_rest + added], axis=1)
-        return flow_of(self._law, strain, before.state, self._parts)
+        return Flow(self._law, strain, before.state, self._parts)
 
     @property
     def beyond(self) -> str:

@@ -67,7 +67,7 @@ class _Swept(FlowPast[PrismState]):
 
     def along(self, added: Array) -> Array:
         """See `FlowPast`."""
-        return self._stiff * self._sweep.changes(added)
+        return self._stiff * self._sweep.along(added)[0]
 
     def _last(self, displacement: Array) -> PrismState:
         """Return the state at the last column, with this displacement of the surface."""
