@@ -24,7 +24,6 @@ import numpy as np
 
 from solver.errors import LimitLoad, NotConverged, Runaway, TooLong, WindowTooSmall
 from solver.linear.iterative import gmres
-from solver.linear.solvers import one_thread
 from solver.materials.law import Law
 from solver.materials.state import PlasticState
 from solver.rolling.flow import PARTS
@@ -248,25 +247,6 @@ def passing(
         if unsolved and min(sizes[-_PATIENCE:]) > _PROGRESS * earlier:
             break
     raise NotConverged(f"no steady pass was found in {len(sizes) - 1} steps of Newton's method")
-
-
-def followed(
-    track: PassedBody[S],
-    material: Law,
-    load: PassingLoad,
-    before: S,
-    beside: Pass[S],
-    tolerance: float = EXACT,
-) -> Pass[S]:
-    """Return a pass that is almost ``beside``, so exactly that differences of the two can be taken.
-
-    Other parameters and errors are those of `passing`.
-    """
-    with one_thread():
-        return passing(
-            track, material, load.exact, before, beside.strain, start=beside.loading.start,
-            parts=beside.parts, tolerance=tolerance,
-        )  # fmt: skip
 
 
 class _Sized(Protocol):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.errors import ModelError
 from solver.rolling.scenes.schedule import Schedule
 
 
@@ -69,8 +68,3 @@ def test_loads_and_ways_are_amplitudes_over_the_same_time():
     assert [a.at(20.0) for a in (timetable.load, timetable.drive, timetable.way)] == [1, 1, 1]
     assert [a.at(back) for a in (timetable.load, timetable.drive, timetable.way)] == [1, -1, -1]
     assert schedule(driven=False).drive.value.any() == np.False_
-
-
-def test_an_advance_beyond_half_the_track_is_refused():
-    with pytest.raises(ModelError, match="step"):
-        schedule(step=60.0)

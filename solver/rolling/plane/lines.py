@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.mesh.lines import continued, graded
 from solver.typing import Array
 
@@ -46,8 +47,20 @@ def track_lines(
 
 
 def window_elements(a: float, h: float, reach: float = 1.0) -> tuple[int, int]:
-    """Return the numbers of elements in the window ahead of and behind the load."""
+    """Return the numbers of elements in the window ahead of and behind the load.
+
+    Raises
+    ------
+    ModelError
+        for ``element_size``, if there are too many, or it is more than half the half-width
+    """
+    if not 0 < h <= a / 2:
+        allowed = f"must be at most {a / 2:.4g} mm, half the half-width of the mesh"
+        raise ModelError("element_size", h, allowed)
     ahead, behind = (math.ceil(each * reach * a / h) for each in (_AHEAD, _BEHIND))
+    if (columns := ahead + behind) > MOST_COLUMNS:
+        allowed = f"makes {columns} elements along a half-width of {a:g} mm; at most {MOST_COLUMNS}"
+        raise ModelError("element_size", h, allowed)
     return ahead, behind
 
 

@@ -84,7 +84,7 @@ def rolling(
         raise ModelError(
             "material", material.elasticity, f"must have those of the track, {track.elasticity}"
         )
-    state: Layers = track.rows.virgin(material)
+    state: Layers = track.virgin(material)
     budget = budget or SolveBudget()
     expected: dict[tuple[int, int], Expected] = {}
     starts: dict[int, AppliedLoad] = {}

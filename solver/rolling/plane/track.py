@@ -9,7 +9,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from solver.contact.state import BodyState
-from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.fem.loads import moving_forces
 from solver.fem.surface import Surface, extract
@@ -25,7 +24,7 @@ from solver.model.loads import TravellingPressure
 from solver.rolling.load import LOADED, RELEASED, Given
 from solver.rolling.passing import Pass
 from solver.rolling.plane.layers import Layers
-from solver.rolling.plane.lines import MOST_COLUMNS, track_lines, window_depth, window_elements
+from solver.rolling.plane.lines import track_lines, window_depth, window_elements
 from solver.rolling.plane.rows import CondensedTrack, FlowRows, RowFlow
 from solver.tensors import SQRT2
 from solver.typing import Array, Ints
@@ -67,12 +66,7 @@ class Track:
         reach: float = 1.0,
     ) -> None:
         a, h = half_width, element_size
-        if not 0 < h <= a / 2:
-            raise ModelError("element_size", h, f"must be in (0, {a / 2:.3g}], half the half-width")
         ahead, behind = window_elements(a, h, reach)
-        if (columns := ahead + behind) > MOST_COLUMNS:
-            allowed = f"makes {columns} elements along the track; at most {MOST_COLUMNS}"
-            raise ModelError("element_size", h, allowed)
         self.half_width = a
         self._lines = track_lines(a, h, growth, reach)
         self._contact = CONTACT * reach * a
@@ -109,6 +103,10 @@ class Track:
         edge = 1e-6 * deep
         inside = (x < ahead + edge) & (x > -behind - edge) & (y > -deep - edge)
         return CondensedTrack(self.part, np.flatnonzero(inside))
+
+    def virgin(self, law: Law) -> Layers:
+        """Return the state before any load."""
+        return self.rows.virgin(law)
 
     @property
     def at_rest(self) -> Array:

@@ -122,33 +122,6 @@ class ConeProblem:
         return float(self.lines.slope.max())
 
 
-class ConeSolution:
-    """The solution of a problem.
-
-    Attributes
-    ----------
-    values : (n, m, 3) pressure and shear [MPa]
-    effects : (n, m, 3) gap and slip [mm]
-    rigid : (k,) rigid motions
-    status : (n, m) OPEN, STICK or SLIP
-    steps : number of Newton steps
-    """
-
-    def __init__(self, found: _Iterate, tangent: _Tangent | None, steps: int) -> None:
-        self.values, self.effects, self.rigid = found.values, found.effects, found.rigid
-        self.status, self.steps = found.status, steps
-        self._found, self._tangent = found, tangent
-
-    def along(self, change: Array) -> tuple[Array, Array]:
-        """Return the change of values and rigid motions with that of the offset (n, m, 3).
-
-        The equations are those of the last Newton step, if no point has changed its status since.
-        """
-        if self._tangent is None or not self._tangent.holds(self._found):
-            self._tangent = _Tangent(self._found)
-        return self._tangent.along(change)
-
-
 def solve_cone(
     problem: ConeProblem, values: Array, rigid: Array, tolerance: float = TOLERANCE
 ) -> ConeSolution:
@@ -159,18 +132,19 @@ def solve_cone(
     NoContact
         if none was found
     """
-    here, tangent = _Iterate(problem, values, rigid), None
+    here, tangent = ConeSolution(problem, values, rigid), None
     most = _LOST * abs(problem.resultants[0]) / np.abs(problem.weights[0]).max()
     for step in range(_STEPS):
         if here.error <= tolerance * here.values[..., NORMAL].max():
-            return ConeSolution(here, tangent, step)
+            here.steps, here.tangent = step, tangent
+            return here
         tangent = _Tangent(here)
 
         def moved(
-            share: float, here: _Iterate = here, step: tuple[Array, Array] = tangent.step()
-        ) -> _Iterate:
+            share: float, here: ConeSolution = here, step: tuple[Array, Array] = tangent.step()
+        ) -> ConeSolution:
             change, motion = step
-            return _Iterate(problem, here.values + share * change, here.rigid + share * motion)
+            return ConeSolution(problem, here.values + share * change, here.rigid + share * motion)
 
         here = searched(moved, here.size, _SHORTEST)
         if not here.pull.max() < most:
@@ -178,11 +152,22 @@ def solve_cone(
     raise NoContact(f"no contact forces were found in {step + 1} steps of Newton's method")
 
 
-class _Iterate:
-    """Values and rigid motions, and their errors in the conditions."""
+class ConeSolution:
+    """Values and rigid motions, and their errors in the conditions: an iterate, or the solution.
+
+    Attributes
+    ----------
+    values : (n, m, 3) pressure and shear [MPa]
+    effects : (n, m, 3) gap and slip [mm]
+    rigid : (k,) rigid motions
+    status : (n, m) OPEN, STICK or SLIP
+    steps, tangent : number of Newton steps to the solution, and the last one's equations
+    """
 
     def __init__(self, problem: ConeProblem, values: Array, rigid: Array) -> None:
         self.problem, self.values, self.rigid = problem, values, rigid
+        self.steps = 0
+        self.tangent: _Tangent | None = None
         moved = np.tensordot(rigid, problem.motions, 1)
         self.effects = problem.offset + problem.influence.of(values) + moved
         own = problem.influence.own()
@@ -199,9 +184,9 @@ class _Iterate:
         self.pull = np.hypot(pulled[..., 0], pulled[..., 1])
         slips = self.closed & (self.pull > self.bound)
         self.status = np.where(slips, SLIP, np.where(self.closed, STICK, OPEN))
-        self.along = np.zeros_like(q)
-        np.divide(pulled, self.pull[..., None], out=self.along, where=slips[..., None])
-        nearest = np.where(slips[..., None], self.bound[..., None] * self.along, pulled)
+        self.heading = np.zeros_like(q)
+        np.divide(pulled, self.pull[..., None], out=self.heading, where=slips[..., None])
+        nearest = np.where(slips[..., None], self.bound[..., None] * self.heading, pulled)
         self.missed = q - np.where(self.closed[..., None], nearest, 0)
         self.unbalanced = problem.resultants - np.tensordot(problem.weights, values, values.ndim)
         largest = np.abs(problem.weights).max(axis=(1, 2, 3))
@@ -213,15 +198,24 @@ class _Iterate:
         ))  # fmt: skip
         self.size = float(np.hypot(np.linalg.norm(normal), np.linalg.norm(tangential)))
 
+    def along(self, change: Array) -> tuple[Array, Array]:
+        """Return the change of values and rigid motions with that of the offset (n, m, 3).
+
+        The equations are those of the last Newton step, if no point has changed its status since.
+        """
+        if self.tangent is None or not self.tangent.holds(self):
+            self.tangent = _Tangent(self)
+        return self.tangent.along(change)
+
 
 class _Tangent:
     """Newton's equations at an iterate, factorised: one for each unknown of its closed points."""
 
-    def __init__(self, here: _Iterate) -> None:
+    def __init__(self, here: ConeSolution) -> None:
         problem = here.problem
         self._here, self._influence = here, problem.influence
         status, pull, bound = (a.ravel() for a in (here.status, here.pull, here.bound))
-        along = here.along.reshape(-1, 2)
+        along = here.heading.reshape(-1, 2)
         closed = np.flatnonzero(status != OPEN)
         rough = problem.steepest > 0
         stick = np.flatnonzero(status == STICK) if rough else closed[:0]
@@ -258,7 +252,7 @@ class _Tangent:
         except ZeroDivisionError:
             raise NoContact(_LOOSE) from None
 
-    def holds(self, other: _Iterate) -> bool:
+    def holds(self, other: ConeSolution) -> bool:
         """Whether points have the same status at another iterate."""
         return bool((self._here.status == other.status).all())
 
@@ -268,8 +262,8 @@ class _Tangent:
         known = np.where(here.closed[..., None], 0, -here.values)
         slips = here.status == SLIP
         p, q = here.values[..., NORMAL], here.values[..., TANGENTS]
-        short = here.slope * p + here.level - (q * here.along).sum(axis=-1)
-        known[..., TANGENTS] += np.where(slips, short, 0)[..., None] * here.along
+        short = here.slope * p + here.level - (q * here.heading).sum(axis=-1)
+        known[..., TANGENTS] += np.where(slips, short, 0)[..., None] * here.heading
         if not here.problem.steepest:
             known[..., TANGENTS] = -q
         follows = self._influence.of(known)

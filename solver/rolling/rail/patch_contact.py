@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.errors import WindowTooSmall
-from solver.parameters import Length, check
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.friction_cone import NORMAL, OPEN, SLIP, TANGENTS
@@ -176,14 +175,13 @@ class EllipticPatch(PatchLoad):
     """
 
     grid: PatchGrid
-    a: Length
-    b: Length
+    a: float
+    b: float
     centre: float = 0.0
     shear: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Raise `ModelError` for axes that are not positive, `WindowTooSmall` for a small grid."""
-        check(self)
+        """Raise `WindowTooSmall` for a grid that is too small."""
         x, z = self.grid.x, self.grid.z
         beside = max(z[1] - self.centre + self.b, self.centre + self.b - z[-2])
         if self.a > min(x[0], -x[-1]) - self.grid.spacing / 2 or beside > 0:

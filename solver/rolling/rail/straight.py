@@ -55,7 +55,7 @@ class StraightPrism:
         section = self._section
         at = section.weights[..., None] * eigenstress.reshape(*section.weights.shape, 6)
         each = np.einsum("eqab,eqa->eb", section.B0, at)
-        force = np.bincount(section.dofs.ravel(), each.ravel(), section.n)
+        force = np.asarray(np.bincount(section.dofs.ravel(), each.ravel(), section.n), dtype=float)
         u = np.zeros(section.n)
         u[section.free] = self._solver.solve(force[section.free])
         return u

@@ -14,6 +14,7 @@ import numpy as np
 from solver.audit.report import Audit
 from solver.errors import LimitLoad, ModelError, NotConverged, WindowTooSmall
 from solver.late import Late
+from solver.linear.solvers import one_thread
 from solver.loading.outcome import Outcome, Tally
 from solver.materials.doubts import doubts
 from solver.materials.law import Law
@@ -23,7 +24,7 @@ from solver.results.mesh_fields import MeshFields
 from solver.results.run import FinishedRun, Values
 from solver.results.view import View
 from solver.rolling.load import PassingLoad
-from solver.rolling.passing import Pass, SolveBudget
+from solver.rolling.passing import EXACT, Pass, SolveBudget, passing
 from solver.rolling.results.stage import SteadyBody
 from solver.scenes.scene import Monitor, Scene
 from solver.typing import Array
@@ -40,16 +41,18 @@ class Passes(ABC):
     ----------
     parameters : those of the run with the most passes
     law : law of the material
+    track : the body
     extent : size of the window in words, for the error if the largest window is too small
     beside : (pass) -> fields of a further body, None without
-    rounded : whether passes are known to ten digits only: derivatives take wider differences
+    exact : tolerance of passes of which differences are taken: of wider ones if it is above `EXACT`
     """
 
     parameters: Any
     law: Law
+    track: Any
     extent = ""
     beside: Callable[[Pass[Any]], MeshFields] | None = None
-    rounded = False
+    exact = EXACT
 
     @abstractmethod
     def found(self, budget: SolveBudget) -> Iterator[Pass[Any]]:
@@ -59,7 +62,10 @@ class Passes(ABC):
     def load(self, number: int) -> PassingLoad:
         """Return the load of a pass, counted from 0."""
 
-    @abstractmethod
+    def way(self, number: int) -> int:
+        """Return the direction of a pass, counted from 0: 1 along +x, -1 along -x."""
+        return 1
+
     def follow(self, beside: Pass[Any], last: Pass[Any] | None, number: int) -> Pass[Any]:
         """Return a pass, counted from 0, of a run whose parameters are almost those of another one.
 
@@ -70,6 +76,14 @@ class Passes(ABC):
         beside : the same pass of the other run
         last : the pass before, None for the first one
         """
+        before = last.left if last else self.track.virgin(self.law)
+        before = before if self.way(number) == 1 else before.mirrored
+        with one_thread():
+            found = passing(
+                self.track, self.law, self.load(number).exact, before, beside.strain,
+                start=beside.loading.start, parts=beside.parts, tolerance=self.exact,
+            )  # fmt: skip
+        return replace(found, direction=self.way(number))
 
     @abstractmethod
     def same_mesh(self, parameters: Any) -> bool:
@@ -187,7 +201,7 @@ class _Path:
             self._steps = self._state["steps"].astype(int).tolist()
         each = []
         if asked := self._scene.derivatives:
-            wider = asked.by if self._passes.rounded else ()
+            wider = asked.by if self._passes.exact > EXACT else ()
             self._family = _Family(asked, self._scene, self._last, wider)
             self._family.keep_mesh(self._last, self._passes.same_mesh)
             each = [self._last, *self._family.runs(self._last)]

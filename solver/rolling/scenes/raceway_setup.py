@@ -100,7 +100,7 @@ def geometry(parameters: RacewayParameters, reach: float = 1.0) -> RacewayGeomet
     if p.groove < math.inf:
         groove = p.groove, p.groove * math.sin(min(_GROOVE * half_width / p.groove, _STEEPEST))
     return RacewayGeometry(
-        elasticity=(p.youngs_modulus, p.poisson_ratio),
+        elasticity=p.elasticity,
         block=_BLOCK * max(a, b),
         groove=groove,
         half_width=half_width,
@@ -118,7 +118,7 @@ def section_of(own: RacewayGeometry) -> Section:
     """Return the meshed section of a raceway, held at its foot."""
     return Section(
         raceway_mesh(2 * own.block, own.block, own.zone, own.groove),
-        own.elastic,
+        own.elasticity,
         supports={"foot": "xyz"},
     )
 

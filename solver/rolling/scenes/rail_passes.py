@@ -20,7 +20,7 @@ from solver.results.run import FinishedRun
 from solver.results.view import View
 from solver.rolling.audit.plain_rail import PlainPrism
 from solver.rolling.audit.rail import audit_prism
-from solver.rolling.passing import Pass, SolveBudget, followed
+from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.patch_contact import AppliedPatch, PatchContact, PatchLoad, PatchStart
 from solver.rolling.rail.track import PrismTrack
@@ -38,8 +38,6 @@ REACHES = (1.0, 1.4, 2.0)
 _TRIED = {"draft": "standard"}
 """The accuracy that is tried where another one is lost; finer ones than these need too much memory
 to be tried unasked."""
-EXACT_ON_RAIL = 1e-10
-"""Tolerance of passes of which differences of 1e-5 are taken; rounding of waves leaves 3e-11."""
 _SETTLED = 1
 """Largest number of Newton steps of a pass after which the next pass begins with its strain."""
 
@@ -114,7 +112,7 @@ class RailPasses(Passes):
     prism, load_on : of the scene
     """
 
-    rounded = True
+    exact = 1e-10  # rounding of waves leaves 3e-11
 
     def __init__(
         self, prism: Prism, load_on: LoadOn, parameters: Any, view: View, reach: float
@@ -123,10 +121,10 @@ class RailPasses(Passes):
         self._each, self._load_on = parameters.each_pass(), load_on
         self._prism, self._reach = prism, reach
         self._made: tuple[Any, PatchLoad] | None = None
-        self._track = prism(parameters, reach)
-        body = PrismBody(self._track, self.law, view.profile_body)
+        self.track = prism(parameters, reach)
+        body = PrismBody(self.track, self.law, view.profile_body)
         self._samples = Samples(body, view)
-        z, y = self._track.points
+        z, y = self.track.points
         self.extent = f"{np.ptp(z):.3g} mm wide and {np.ptp(y):.3g} mm deep"
         self.beside = partial(zone_fields, body, view.loaded, view.unloaded)
         self._first = 0
@@ -138,7 +136,7 @@ class RailPasses(Passes):
         """See `Passes`: the same object as before if it is equal."""
         own, known = self._each[number], self._made
         if known is None or known[0] != own:
-            known = self._made = own, self._load_on(self._track, own, known and known[1])
+            known = self._made = own, self._load_on(self.track, own, known and known[1])
         return known[1]
 
     def found(self, budget: SolveBudget) -> Iterator[Pass[PrismState]]:
@@ -151,7 +149,7 @@ class RailPasses(Passes):
         If an easier pass needs a larger window, that is tried. In the largest one the run ends:
         finer elements would not help.
         """
-        track, law, first = self._track, self.law, self._first
+        track, law, first = self.track, self.law, self._first
         before, guess, start = self._before or track.virgin(law), self._guess, self._start
         last = self.load(first - 1) if first else None
         for number in range(first, self.parameters.passes):
@@ -166,16 +164,9 @@ class RailPasses(Passes):
             guess = found.strain if found.steps <= _SETTLED else None
             yield found
 
-    def follow(
-        self, beside: Pass[PrismState], last: Pass[PrismState] | None, number: int
-    ) -> Pass[PrismState]:
-        """See `Passes`."""
-        before = last.after if last else self._track.virgin(self.law)
-        return followed(self._track, self.law, self.load(number), before, beside, EXACT_ON_RAIL)
-
     def same_mesh(self, parameters: Any) -> bool:
         """See `Passes`. Nodes may move, but not become more or fewer."""
-        one, other = self._track, self._prism(parameters, self._reach)
+        one, other = self.track, self._prism(parameters, self._reach)
         counts = [
             (each.weights.shape, each.grid.stations, each.modes.stations) for each in (one, other)
         ]
@@ -200,7 +191,7 @@ class RailPasses(Passes):
 
     def audit(self, found: Pass[PrismState], left: PrismState | None, number: int) -> Audit:
         """See `Passes`."""
-        return audit_prism(self._track, self.law, found, left, _plain(self._track))
+        return audit_prism(self.track, self.law, found, left, _plain(self.track))
 
     def state(self, found: Pass[PrismState], traces: Sequence[RailTrace]) -> Mapping[str, Array]:
         """See `Passes`."""
@@ -217,7 +208,7 @@ class RailPasses(Passes):
 
     def begin(self, state: Mapping[str, Array]) -> tuple[list[RailTrace], PrismState]:
         """See `Passes`."""
-        virgin = self._track.virgin(self.law)
+        virgin = self.track.virgin(self.law)
         left = PrismState(
             virgin.state.unpacked(state["internal"]), state["strain"], state["displacement"]
         )

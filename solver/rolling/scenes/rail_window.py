@@ -89,7 +89,7 @@ class PrismGeometry(ABC):
 
     Attributes
     ----------
-    elasticity : Young's modulus and Poisson ratio
+    elasticity : elastic constants of the prism
     half_width, depth, size, split : of the zone that may yield, see `Zone` [mm]
     spacing : distance of stations [mm]
     reach : half the length where the load is expected to act [mm]; it may act as far as the window
@@ -97,7 +97,7 @@ class PrismGeometry(ABC):
     apart : distance of equal loads, a multiple of ``spacing`` [mm]; None of a load that is alone
     """
 
-    elasticity: tuple[float, float]
+    elasticity: Elasticity
     half_width: float
     depth: float
     size: float
@@ -110,12 +110,6 @@ class PrismGeometry(ABC):
     @abstractmethod
     def elements(self) -> int:
         """Number of elements of the zone."""
-
-    @property
-    def elastic(self) -> Elasticity:
-        """Elastic constants."""
-        E, nu = self.elasticity
-        return Elasticity(youngs_modulus=E, poisson_ratio=nu)
 
     @property
     def waves(self) -> int:

@@ -155,14 +155,7 @@ class RollingParameters(WheelParameters):
         ):  # fmt: skip
             if (value := getattr(self, name)) != usual:
                 raise ModelError(name, value, f"must be {usual} with track = endless")
-        a, h = self.mesh_width, self.element_size
-        if h > a / 2:
-            allowed = f"must be at most {a / 2:.4g} mm, half the half-width of the mesh"
-            raise ModelError("element_size", h, allowed)
-        columns = sum(window_elements(a, h))
-        if columns > MOST_COLUMNS:
-            allowed = f"makes {columns} elements along a half-width of {a:g} mm; at most"
-            raise ModelError("element_size", h, f"{allowed} {MOST_COLUMNS}")
+        window_elements(self.mesh_width, self.element_size)
 
     def _check_length(self) -> None:
         """Raise `ModelError` for parameters that a track of given length cannot have."""

@@ -27,7 +27,7 @@ from solver.results.shakedown import ShakedownState
 from solver.results.view import View
 from solver.rolling.audit.plane import audit_pass
 from solver.rolling.load import FULL_SLIP, PassingLoad, RollingLoad
-from solver.rolling.passing import Pass, SolveBudget, followed
+from solver.rolling.passing import Pass, SolveBudget
 from solver.rolling.plane.layers import Layers
 from solver.rolling.plane.lines import rim_elements, track_lines, wheel_nodes
 from solver.rolling.plane.rolling import rolling
@@ -85,7 +85,7 @@ def _first_guess(parameters: RollingParameters, reach: float) -> Array | None:
         with one_thread():
             found = search(
                 track, p.material(), load_on(track, coarse, coarse.of_pass(0)),
-                track.rows.virgin(p.material()), _first_guess(coarse, reach), parts=_PARTS,
+                track.virgin(p.material()), _first_guess(coarse, reach), parts=_PARTS,
                 tolerance=_TOLERANCE,
             )  # fmt: skip
     except LimitLoad:
@@ -210,9 +210,9 @@ class TrackPasses(Passes):
 
     def __init__(self, parameters: RollingParameters, view: View, reach: float) -> None:
         self.parameters, self.law, self._reach = parameters, parameters.material(), reach
-        self._track = track_for(parameters, reach)
+        self.track = track_for(parameters, reach)
         self._ways = parameters.directions
-        self._by_way = {way: Samples(TrackBody(self._track, way), view) for way in set(self._ways)}
+        self._by_way = {way: Samples(TrackBody(self.track, way), view) for way in set(self._ways)}
         self._by_depth: dict[int, Array] = {}
 
     def found(self, budget: SolveBudget) -> Iterator[Pass[Layers]]:
@@ -223,18 +223,15 @@ class TrackPasses(Passes):
     def _loads(self) -> list[PassingLoad]:
         """The loads of the block of passes."""
         p = self.parameters
-        return [load_on(self._track, p, own) for own in p.block]
+        return [load_on(self.track, p, own) for own in p.block]
 
     def load(self, number: int) -> PassingLoad:
         """See `Passes`."""
         return self._loads[number % len(self._loads)]
 
-    def follow(self, beside: Pass[Layers], last: Pass[Layers] | None, number: int) -> Pass[Layers]:
+    def way(self, number: int) -> int:
         """See `Passes`."""
-        way, before = self._ways[number], last.left if last else self._track.rows.virgin(self.law)
-        before = before if way == 1 else before.mirrored
-        found = followed(self._track, self.law, self.load(number), before, beside)
-        return replace(found, direction=way)
+        return self._ways[number]
 
     def same_mesh(self, parameters: RollingParameters) -> bool:
         """See `Passes`. Nodes of the wheel may move, but not become more or fewer."""
@@ -260,7 +257,7 @@ class TrackPasses(Passes):
 
     def trace(self, found: Pass[Layers]) -> Trace:
         """Return the trace of a pass, from the state that it leaves."""
-        left, elasticity = found.left.whole, self._track.elasticity
+        left, elasticity = found.left.whole, self.track.elasticity
         by_depth = self._profile(found.direction)
         strain = np.maximum(by_depth @ left.accumulated, 0.0)
         stress, flow = (
@@ -277,7 +274,7 @@ class TrackPasses(Passes):
         """Return the matrix (n_depth, 1 + n_rows) from surface and rows to the profile."""
         if way in self._by_depth:
             return self._by_depth[way]
-        samples, track = self._by_way[way], self._track
+        samples, track = self._by_way[way], self.track
         rows, n = track.rows, track.part.weights.size
         each = np.zeros((1 + len(rows.every), n + len(rows.highest)))
         each[0, n:] = 1.0
@@ -288,7 +285,7 @@ class TrackPasses(Passes):
 
     def audit(self, found: Pass[Layers], left: Layers | None, number: int) -> Audit:
         """See `Passes`."""
-        return audit_pass(self._track, self.law, found, left, self._ways[number])
+        return audit_pass(self.track, self.law, found, left, self._ways[number])
 
     def decided(self, traces: Sequence[Trace]) -> bool:
         """Return whether the passes so far decide the shakedown state, if they end then."""

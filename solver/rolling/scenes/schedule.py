@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.errors import ModelError
 from solver.loading.program import Lap, Program, Stage
 from solver.model.amplitude import Amplitude
 
@@ -46,10 +45,6 @@ class Schedule:
     driven: bool
     press: int = 8
     release: int = 4
-
-    def __post_init__(self) -> None:
-        if self.half_steps < 1:
-            raise ModelError("step", self.step, f"must be at most {self.track / 2:g} mm")
 
     @property
     def half_steps(self) -> int:

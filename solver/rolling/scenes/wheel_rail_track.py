@@ -139,7 +139,7 @@ def _geometry(parameters: WheelRailParameters, reach: float) -> RailGeometry:
         cant=p.cant,
         foundation=p.foundation,
         span=None if p.span == "endless" else float(p.span),
-        elasticity=(p.youngs_modulus, p.poisson_ratio),
+        elasticity=p.elasticity,
         at=at,
         half_width=half_width,
         depth=depth,
@@ -212,7 +212,7 @@ def section_of(own: RailGeometry) -> Section:
     spring = own.foundation / (rail.foot if isinstance(rail, MeshedRail) else _FOOT)
     return Section(
         mesh_of(own).mesh,
-        own.elastic,
+        own.elasticity,
         springs={"foot": (spring, spring, spring)},
     )
 
