@@ -12,15 +12,10 @@ from skfem import Mesh
 
 from solver.errors import ModelError
 from solver.memory import kept
+from solver.mesh.cells import collapsed, facets_of, mesh_of_cells, triangles_of
 from solver.mesh.rounding import ROUNDED, with_zeros
 from solver.model.tabulated import Tabulated, columns_of
-from solver.rolling.rail.profiles.meshed_rail import (
-    collapsed,
-    facets_of,
-    mesh_of_cells,
-    section_of,
-    triangles_of,
-)
+from solver.rolling.rail.profiles.meshed_rail import section_of
 from solver.rolling.rail.profiles.points import FOOT, RUNNING, SectionMesh
 from solver.typing import Array, Ints
 from studies.scenes.formats import read_mesh

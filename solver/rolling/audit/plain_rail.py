@@ -400,14 +400,9 @@ class PlainPrism:
             return moved
         apart = np.arange(count)[:, None] - np.arange(count)
         beyond = far.displacement[:, self.track.before + apart]
-        each = np.stack([self._resultants_of(one) for one in traction])
+        each = np.stack([self.resultants((self._hats.T @ one).reshape(-1, 1)) for one in traction])
         added = np.einsum("rcdq,dq->cr", beyond, each)
         return moved + added.reshape(count, 3, -1).swapaxes(1, 2)
-
-    def _resultants_of(self, traction: Array) -> Array:
-        """Return the resultants (4,) of tractions (m, 3) at one station."""
-        nodal = (self._hats.T @ traction).reshape(self._n, 1)
-        return self.resultants(nodal)
 
 
 def _times(matrix: sparse.csr_array, values: Complexes) -> Complexes:

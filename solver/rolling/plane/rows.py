@@ -113,7 +113,8 @@ class FlowRows:
         self.points = points
         self.weights = part.volumes[points]
         n_rows = len(points)
-        length = self._length(points)
+        elements = np.unique(points // part.weights.shape[1])
+        length = float(np.ptp(part.body.mesh.p[0, part.body.mesh.t[:, elements]]))
         self.depth = -part.points[1].ravel()[points[:, 0]]
         self.uppermost = int((self.depth - self.depth[0] < _LEVEL * deep).sum())
         self._thickness = self.weights.sum(axis=1) / length
@@ -172,12 +173,6 @@ class FlowRows:
         k = self.uppermost
         near, far = self.depth[0], self.depth[k]
         return np.asarray((far * values[:k] - near * values[k : 2 * k]) / (far - near))
-
-    def _length(self, points: Ints) -> float:
-        """Return the length of the window [mm]."""
-        elements = np.unique(points // self.part.weights.shape[1])
-        corners = self.part.body.mesh.p[0, self.part.body.mesh.t[:, elements]]
-        return float(np.ptp(corners))
 
     def _force_of(self, points: Ints, strain: sparse.csr_array) -> sparse.csr_array:
         """Return the matrix from plastic strains at points to equivalent nodal forces."""

@@ -266,9 +266,11 @@ class RollingWheel(PassingLoad):
         bound[geometry.at] = problem.lines.least(found.forces[: len(geometry.at)])
         moved = problem.moved(found.forces, found.rigid)
         gap[geometry.at] = moved[: len(geometry.at)]
+        force = np.zeros(track.part.n)
+        force[surface.dofs] = known.on_track
         turns = self._drive is not None
         return RollingContact(
-            force=self._nodal(known.on_track),
+            force=force,
             u=u + track.under(known.on_track),
             along=along,
             x=surface.X[0, surface.vertices],
@@ -378,9 +380,3 @@ class RollingWheel(PassingLoad):
             A=np.stack(motions, axis=1),
             balance=np.array(balance),
         )
-
-    def _nodal(self, force: Array) -> Array:
-        """Return the forces (n,) on all nodes of the track from those on its surface."""
-        whole = np.zeros(self.track.part.n)
-        whole[self.track.surface.dofs] = force
-        return whole

@@ -91,7 +91,7 @@ def sampled_answers(section: Section, forces: Array, wavenumbers: Array) -> Samp
         )
         for wave, answer in answers.items():  # also where rounding of the stiffness would count
             shares[:, wave] = basis.T @ answer
-        tried = _halfway(sorted(answers))
+        tried = [(one + other) // 2 for one, other in pairwise(sorted(answers)) if other > one + 1]
         made, k = shares[:, tried], wavenumbers[tried, None]
         sides = [np.tensordot(on_basis[power], made * k**power, 1) for power in range(len(terms))]
         missed = np.abs(f[:, None] - sum(sides)).max(axis=0)
@@ -109,11 +109,6 @@ def _spread(k: Array, size: float) -> list[int]:
     at = np.sin(np.pi / 2 * np.linspace(0.0, 1.0, _FIRST)) ** 2  # closer at the ends
     wanted = bend * np.expm1(np.log1p(k.max() / bend) * at)
     return np.unique(np.abs(k - wanted[:, None]).argmin(axis=1)).tolist()
-
-
-def _halfway(waves: list[int]) -> list[int]:
-    """Return the numbers halfway between increasing ones, where there are any between."""
-    return [(one + other) // 2 for one, other in pairwise(waves) if other - one > 1]
 
 
 def _split(answers: Array, along: Bools) -> Array:

@@ -266,10 +266,8 @@ class Stiffness:
     @property
     def terms(self) -> list[sparse.csr_array]:
         """The whole matrices K0, K1 and K2."""
-        return [_whole(self.pattern, each) for each in self._terms]
-
-
-def _whole(pattern: sparse.csr_array, data: Array) -> sparse.csr_array:
-    """Return a symmetric matrix from the values of its upper triangle."""
-    upper = sparse.csr_array((data, pattern.indices, pattern.indptr), shape=pattern.shape)
-    return sparse.csr_array(upper + sparse.triu(upper, 1).T)
+        own, found = self.pattern, []
+        for data in self._terms:
+            upper = sparse.csr_array((data, own.indices, own.indptr), shape=own.shape)
+            found.append(sparse.csr_array(upper + sparse.triu(upper, 1).T))
+        return found

@@ -22,7 +22,7 @@ from solver.rolling.rail.modes import Modes
 from solver.rolling.rail.patch_grid import RunningSurface
 from solver.rolling.rail.section import Section
 from solver.rolling.rail.straight import SettledStress, StraightPrism, check_elastic
-from solver.typing import Array, Bools, Ints
+from solver.typing import Array, Bools
 
 
 class PrismTrack:
@@ -84,7 +84,8 @@ class PrismTrack:
         self.far = FarField(self.modes, -before * spacing, levels, span) if levels else None
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)
-        self.rim = _rim(section, zone, self.modes.points)
+        beside = np.flatnonzero(np.isin(section.dofs, section.dofs[~zone]).any(axis=1))
+        self.rim = np.flatnonzero(np.isin(self.modes.points // section.weights.shape[1], beside))
         self.initial: SettledStress | None = None
 
     @property
@@ -286,10 +287,3 @@ def _fading(count: int) -> Array:
     """Return the factors (count,) of plastic strain behind the window: from 1 down to 0."""
     t = np.arange(1, count + 1) / (count + 1)
     return np.asarray(1 - t**3 * (10 - 15 * t + 6 * t**2))
-
-
-def _rim(section: Section, zone: Bools, points: Ints) -> Ints:
-    """Return the numbers, among those of the zone, of points in elements beside others."""
-    outside = np.unique(section.dofs[~zone])
-    beside = np.flatnonzero(np.isin(section.dofs, outside).any(axis=1))
-    return np.flatnonzero(np.isin(points // section.weights.shape[1], beside))

@@ -76,8 +76,13 @@ def by_rail_passes(
         own = _TRIED.get(last.accuracy)
         if own is None or isinstance(error, LimitLoad) or scene.remedy(last, error) != finer(last):
             return None
-        others = computed(scene, [replace(run, accuracy=own) for run in remaining], monitor)
-        return (_noted(run, f"{error}: {{}} with accuracy = {own} instead") for run in others)
+
+        def noted(run: FinishedRun) -> FinishedRun:
+            done = "computed" if run.complete else "tried"
+            note = f"{error}: {done} with accuracy = {own} instead"
+            return replace(run, notes=(*run.notes, note), state=dict)
+
+        return map(noted, computed(scene, [replace(r, accuracy=own) for r in remaining], monitor))
 
     return computed(scene, runs, monitor, otherwise=otherwise, begun=begun)
 
@@ -96,12 +101,6 @@ def effort_of(work: Callable[[Any], Effort], parameters: Any) -> Effort:
             unknowns, memory = max(own.unknowns, most.unknowns), max(own.memory, most.memory)
             return replace(own, unknowns=unknowns, memory=memory)
     return own
-
-
-def _noted(run: FinishedRun, note: str) -> FinishedRun:
-    """Return a run of another accuracy with a note, and without a state."""
-    note = note.format("computed" if run.complete else "tried")
-    return replace(run, notes=(*run.notes, note), state=dict)
 
 
 class RailPasses(Passes):

@@ -86,16 +86,15 @@ AXLE_ROTATION = declare(
 
 def method(parameters: RollingParameters) -> Method:
     """Return the method of the passes: steady on an endless track, else by increments."""
-    return by_steady_passes if parameters.endless else _on_a_track
 
+    def on_a_track(
+        scene: Scene, runs: Sequence[RollingParameters], monitor: Monitor
+    ) -> Iterator[FinishedRun]:
+        if scene.derivatives:
+            raise ModelError("track", runs[-1].track, "must be endless: runs have derivatives")
+        return by_increments(scene, runs, monitor)
 
-def _on_a_track(
-    scene: Scene, runs: Sequence[RollingParameters], monitor: Monitor
-) -> Iterator[FinishedRun]:
-    """Compute the passes by increments."""
-    if scene.derivatives:
-        raise ModelError("track", runs[-1].track, "must be endless: runs have derivatives")
-    return by_increments(scene, runs, monitor)
+    return by_steady_passes if parameters.endless else on_a_track
 
 
 def program(parameters: RollingParameters) -> Program:
@@ -106,12 +105,11 @@ def program(parameters: RollingParameters) -> Program:
 def refinement(parameters: RollingParameters) -> StepRefinement | None:
     """Return how the advance is halved until residual stress converges, or None."""
     tolerance = parameters.advance_tolerance * parameters.yield_stress
-    return StepRefinement(measure=_under_mid_track, tolerance=tolerance) if tolerance else None
 
+    def under_mid_track(trace: Trace) -> Array:
+        return trace.stress[len(trace.stress) // 2, [0, 2]]
 
-def _under_mid_track(trace: Trace) -> Array:
-    """Return the residual stress xx and zz under mid-track (2, depth) [MPa]."""
-    return trace.stress[len(trace.stress) // 2, [0, 2]]
+    return StepRefinement(measure=under_mid_track, tolerance=tolerance) if tolerance else None
 
 
 def progress(run: FinishedRun) -> Values:

@@ -20,6 +20,8 @@ _POINTS = 16
 circle."""
 _SAMPLES = 2001
 """Number of samples in the search for the highest point."""
+_ARC = 0.1
+"""Length of the arcs along a spline [mm]."""
 _SHORT = 1e-9
 """Length of a piece over the whole length below which it is left out."""
 
@@ -85,13 +87,9 @@ class Outline:
         for corner, left in zip(corners, lengths - used, strict=True):
             if left < -_SHORT * lengths.sum():
                 raise ModelError("corners", corner.at, "must leave room for the arcs of the next")
-        return cls(np.hstack(joints), np.concatenate(bends))._without_short()
-
-    def _without_short(self) -> Outline:
-        """Return the curve without pieces that have no length."""
-        lengths = self.lengths
-        kept = lengths > _SHORT * lengths.sum()
-        return Outline(self.joints[:, kept], self.bends[kept])
+        found = cls(np.hstack(joints), np.concatenate(bends))
+        kept = found.lengths > _SHORT * found.length
+        return cls(found.joints[:, kept], found.bends[kept])
 
     @property
     def _chords(self) -> Array:
@@ -207,13 +205,12 @@ def arcs(heading: float, radii: Array, turns: Array) -> Array:
     )
 
 
-def smooth_curve(points: Array, spacing: float = 0.1) -> tuple[Array, Array]:
+def smooth_curve(points: Array) -> tuple[Array, Array]:
     """Return joints and curvatures of short arcs along the cubic spline through points.
 
     Parameters
     ----------
     points : (2, n) points, the first coordinate increasing [mm]
-    spacing : length of the arcs [mm]
 
     Returns
     -------
@@ -227,6 +224,6 @@ def smooth_curve(points: Array, spacing: float = 0.1) -> tuple[Array, Array]:
     X = checked_points(points)
     t = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(X)))])
     curve = scipy.interpolate.CubicSpline(t, X, axis=1)
-    at = np.linspace(0.0, t[-1], max(2, round(t[-1] / spacing)) + 1)
+    at = np.linspace(0.0, t[-1], max(2, round(t[-1] / _ARC)) + 1)
     (dx, dy), (ax, ay) = curve((at[1:] + at[:-1]) / 2, 1), curve((at[1:] + at[:-1]) / 2, 2)
     return curve(at), (dx * ay - dy * ax) / np.hypot(dx, dy) ** 3

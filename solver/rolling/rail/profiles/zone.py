@@ -256,36 +256,22 @@ def raceway_mesh(
 ) -> MeshQuad2:
     """Return the mesh of a block; its boundaries are ``running`` and ``foot``, the bottom.
 
-    It reaches from -width / 2 to width / 2 and, at z = 0, from y = -height to 0.
+    It reaches from -width / 2 to width / 2 and, at z = 0, from y = -height to 0. The zone is in the
+    middle, within the groove.
 
     Parameters
     ----------
     groove : radius of a groove along the block, its lowest line at z = 0, and half the width of
         the groove [mm]; the shoulders beside it are flat. None for a flat block
-
-    Raises
-    ------
-    ModelError
-        for ``half_width`` or ``depth``, if the zone leaves the groove or the block; for
-        ``groove``, if it is wider than the block or than half a circle
     """
     half = width / 2
     radius, edge = groove or (math.inf, half)
-    if not (0 < edge <= half and edge < radius):
-        raise ModelError("groove", groove, f"must be narrower than {min(half, radius):g} [mm]")
-    if not zone.depth < height:
-        raise ModelError("depth", zone.depth, f"must be below {height:g} [mm]")
 
     def surface(z: Array) -> Array:
         near = np.clip(z, -edge, edge)
         return near**2 / (radius + np.sqrt(radius**2 - near**2)) if groove else 0.0 * z
 
-    limit, middle = (radius * math.asin(edge / radius), zone.at) if groove else (half, zone.at)
-    if groove and abs(zone.at) < edge:
-        middle = radius * math.asin(zone.at / radius)
-    if not abs(middle) + zone.half_width < limit:
-        raise ModelError("half_width", zone.half_width, "must end within the block and its groove")
-    s = middle + np.linspace(-zone.half_width, zone.half_width, zone.columns + 1)
+    s = np.linspace(-zone.half_width, zone.half_width, zone.columns + 1)
     z = radius * np.sin(s / radius) if groove else s
     low, high = z[0], z[-1]
     left = low - _beyond(low + edge, zone.size, half)[:0:-1]
