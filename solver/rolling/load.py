@@ -149,7 +149,7 @@ LOADED, RELEASED = 0.0, 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class LeftState(ABC):
+class LeftState:
     """The state of a body before and after a pass, constant along x; never changed, only replaced.
 
     Attributes
@@ -168,11 +168,6 @@ class LeftState(ABC):
     def accumulated(self) -> Array:
         """Accumulated plastic strain (n,)."""
         return self.state.accumulated
-
-    @property
-    @abstractmethod
-    def mirrored(self) -> Self:
-        """The same state, seen along -x."""
 
 
 S = TypeVar("S", bound=LeftState)

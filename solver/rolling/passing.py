@@ -98,7 +98,7 @@ class Pass(Generic[S]):
     loading : the load on the track
     left_over : largest deviatoric strain of the residual
     steps, solves : number of Newton steps, and of solves with the stiffness
-    direction : 1 if the load moves along +x, -1 if along -x
+    direction : 1 if the load moves along +x, -1 if along -x, which it does in the plane alone
     """
 
     law: Law
@@ -133,7 +133,8 @@ class Pass(Generic[S]):
     @property
     def left(self) -> S:
         """The state behind the pass, in the coordinates of the track: mirrored for direction -1."""
-        return self.after if self.direction == 1 else self.after.mirrored
+        after: Any = self.after
+        return after if self.direction == 1 else after.mirrored
 
 
 def passing(

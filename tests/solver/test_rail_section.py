@@ -158,9 +158,6 @@ def test_a_file_with_a_bad_line_is_refused_by_its_number(tmp_path, text):
         read_points(tmp_path / "none.csv")
 
 
-def test_arcs_that_do_not_fit_are_refused():
-    corners = [RoundedCorner(at, (3.0,)) for at in ((5.0, 0.0), (5.0, 5.0), (0.0, 5.0), (0.0, 0.0))]
-    with pytest.raises(ModelError, match="leave room"):
-        Outline.rounded(corners)
+def test_a_place_beside_the_head_is_refused():
     with pytest.raises(ModelError, match="at = 40"):
         RAIL.place(40.0)

@@ -190,13 +190,6 @@ def test_a_load_that_yields_beyond_the_window_is_told():
         passes(9.0, 1)
 
 
-def test_a_track_with_other_elastic_constants_is_refused():
-    place = track_of(A, 2.0, 1.15, steel().elasticity)
-    soft = Material(youngs_modulus=1e5, poisson_ratio=0.3, yield_stress=YIELD)
-    with pytest.raises(ModelError, match="must have those of the track"):
-        next(rolling(place, soft, place.hertz(1000.0), [1]))
-
-
 @pytest.mark.parametrize(("size", "allowed"), [(0.0, "half the half-width"), (1e-3, "at most")])
 def test_elements_too_large_or_too_many_are_refused(size, allowed):
     with pytest.raises(ModelError, match=allowed):

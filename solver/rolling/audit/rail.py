@@ -15,13 +15,12 @@ from solver.rolling.audit.flow import (
     INFLOW,
     STEADINESS,
     AuditedFlow,
-    deviation,
     difference,
     judged,
     largest,
 )
 from solver.rolling.audit.plain_rail import PlainPrism
-from solver.rolling.passing import Pass
+from solver.rolling.passing import Pass, deviation
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.friction_cone import NORMAL, TANGENTS
 from solver.rolling.rail.half_space import half_space
@@ -326,15 +325,13 @@ def _lost(track: PrismTrack, law: Law, found: Pass[PrismState], left: PrismState
     """Return the difference between the state before the pass and that behind the last one.
 
     It is the largest difference of internal variables and strain, as stress over the yield stress,
-    or of displacement, over the largest. A pass in the opposite direction begins with the mirrored
-    state. The first one begins with the initial stress.
+    or of displacement, over the largest. The first pass begins with the initial stress.
     """
     before, displacement = found.before, np.zeros_like(found.before.displacement)
     if left is None:
         state = law.initial(len(before.strain), 6)
         strain = track.initial_strain[track.modes.points]
     else:
-        left = left if found.direction == 1 else left.mirrored
         state, strain, displacement = left.state, left.strain, left.displacement
     off = 2 * law.elasticity.shear_modulus * float(np.abs(before.strain - strain).max())
     off = max(difference(law, before.state, state), off) / law.yield_stress

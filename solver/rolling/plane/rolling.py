@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-from solver.errors import ModelError
 from solver.linear.solvers import one_thread
 from solver.materials.law import Law
 from solver.rolling.load import AppliedLoad, PassingLoad
@@ -73,17 +72,11 @@ def rolling(
 
     Raises
     ------
-    ModelError
-        if the track has other elastic constants
     LimitLoad
         if plastic strain grows without bound
     NotConverged
         if a pass does not converge
     """
-    if material.elasticity != track.elasticity:
-        raise ModelError(
-            "material", material.elasticity, f"must have those of the track, {track.elasticity}"
-        )
     state: Layers = track.virgin(material)
     budget = budget or SolveBudget()
     expected: dict[tuple[int, int], Expected] = {}

@@ -14,7 +14,6 @@ import numpy as np
 from scipy import sparse
 from scipy.interpolate import RegularGridInterpolator
 
-from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
 from solver.linear import solvers as linear
 from solver.linear.schur import SchurComplement
@@ -120,8 +119,6 @@ class FlowRows:
         self._thickness = self.weights.sum(axis=1) / length
         self.ahead = self._in_rows(shallow & (middle[0] > ahead), deep)
         self.behind = downstream = self._in_rows(shallow & (middle[0] < -behind), deep)
-        if len(downstream) != n_rows:
-            raise ModelError("mesh", len(downstream), f"must have {n_rows} rows behind the window")
         self._strain = sparse.csr_array(self._strain_at(points)[:, operator.kept])
         self._force = self._force_of(points, self._strain)
         # all points behind the window have the plastic strain of their row
@@ -139,10 +136,7 @@ class FlowRows:
         points = (np.flatnonzero(elements)[:, None] * n_points + np.arange(n_points)).ravel()
         x, y = self.part.points.reshape(2, -1)[:, points]
         level = np.round(y / (_LEVEL * deep)).astype(np.int64)
-        depths, counts = np.unique(level, return_counts=True)
-        if len(points) == 0 or len(set(counts)) != 1:
-            raise ModelError("mesh", len(depths), "must have its points in rows of equal length")
-        return points[np.lexsort((-x, -level))].reshape(len(depths), -1)
+        return points[np.lexsort((-x, -level))].reshape(len(np.unique(level)), -1)
 
     def virgin(self, law: Law) -> Layers:
         """Return the state before any load."""

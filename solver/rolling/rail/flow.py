@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,16 +28,6 @@ class PrismState(LeftState):
 
     strain: Array
     displacement: Array
-
-    @property
-    def mirrored(self) -> PrismState:
-        """The same state, seen along -x."""
-        return replace(
-            self,
-            state=self.state.mirrored,
-            strain=self.strain * [1.0, 1.0, 1.0, -1.0, 1.0, -1.0],
-            displacement=self.displacement * [-1.0, 1.0, 1.0],
-        )
 
 
 class _Swept(FlowPast[PrismState]):

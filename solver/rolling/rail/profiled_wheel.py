@@ -105,17 +105,10 @@ class ProfiledWheel:
         Returns
         -------
         gap (...), at most 10 [mm]; position z of the wheel's surface there (...); that height [mm]
-
-        Raises
-        ------
-        ModelError
-            for ``profile``, if no place has the wheel above it
         """
         x, z, y, angle = np.broadcast_arrays(x, z, y, angle)
         vertical = self.surface(x, z) - y
         height = -float(vertical.min())
-        if not np.isfinite(height):
-            raise ModelError("profile", height, "must have a wheel above the surface")
         sin, cos = np.sin(angle), np.cos(angle)
 
         def left(t: Array) -> Array:

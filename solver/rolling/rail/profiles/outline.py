@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from solver.errors import ModelError
 from solver.rolling.rail.profiles.points import checked_points
 from solver.typing import Array, Ints
 
@@ -61,16 +60,12 @@ class Outline:
     def rounded(cls, corners: Sequence[RoundedCorner]) -> Outline:
         """Return the polygon of these corners, counterclockwise, with rounded corners.
 
-        Raises
-        ------
-        ModelError
-            if the arcs of two corners overlap
+        The sides must have room for the arcs at their ends.
         """
         X = np.array([corner.at for corner in corners], dtype=float)
         sides = np.roll(X, -1, axis=0) - X
-        lengths = np.hypot(*sides.T)
-        units = sides / lengths[:, None]
-        joints, bends, used = [], [], np.zeros(len(X))
+        units = sides / np.hypot(*sides.T)[:, None]
+        joints, bends = [], []
         for k, corner in enumerate(corners):
             before, after = units[k - 1], units[k]
             turn = np.arctan2(before[0] * after[1] - before[1] * after[0], before @ after)
@@ -78,15 +73,10 @@ class Outline:
             radii = np.array(corner.radii, dtype=float)
             steps = arcs(float(np.arctan2(before[1], before[0])), radii, turns)
             whole = np.column_stack([before, after])
-            back, forth = np.linalg.solve(whole, steps.sum(axis=1)) if len(radii) else (0.0, 0.0)
-            used[k - 1] += back
-            used[k] += forth
+            back = np.linalg.solve(whole, steps.sum(axis=1))[0] if len(radii) else 0.0
             ends = (X[k] - back * before)[:, None] + np.cumsum(np.c_[np.zeros(2), steps], axis=1)
             joints.append(ends)
             bends.append(np.append(np.sign(turn) / radii, 0.0))
-        for corner, left in zip(corners, lengths - used, strict=True):
-            if left < -_SHORT * lengths.sum():
-                raise ModelError("corners", corner.at, "must leave room for the arcs of the next")
         found = cls(np.hstack(joints), np.concatenate(bends))
         kept = found.lengths > _SHORT * found.length
         return cls(found.joints[:, kept], found.bends[kept])
