@@ -60,22 +60,17 @@ def rolling(
 ) -> Iterator[Pass[Layers]]:
     """Yield the passes of a load over a track that begins without plastic strain.
 
+    Errors are those of `search`.
+
     Parameters
     ----------
-    track : the half-plane, with the elastic constants of the material
-    material : law of the track
+    track : the half-plane
+    material : law of the track, with its elastic constants
     load : load as it moves along +x; one for all passes, or one for each
     directions : for each pass, 1 along +x, -1 along -x
     guess : strains (n_rows, n_columns, 4) that the first pass adds, for instance of a coarser mesh
     parts : number of increments between two points of a row, `PARTS` if None
     budget : counts the solves of each pass, those of earlier attempts at the first one included
-
-    Raises
-    ------
-    LimitLoad
-        if plastic strain grows without bound
-    NotConverged
-        if a pass does not converge
     """
     state: Layers = track.virgin(material)
     budget = budget or SolveBudget()

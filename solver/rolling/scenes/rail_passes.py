@@ -49,6 +49,8 @@ class RailTrace(PassTrace):
     lowest: Array
 
 
+_plain = kept(PlainPrism)
+"""(prism) -> its second evaluation for the audit; all runs over it share it."""
 _TRACED = tuple(each.name for each in fields(RailTrace))
 Prism = Callable[[Any, float], PrismTrack]
 """(parameters, ratio of zone and window to their usual size) -> the prism of a scene."""
@@ -216,12 +218,6 @@ class RailPasses(Passes):
         self._first, self._before, self._guess = len(traces), left, state.get("guess")
         self._start = PatchStart(state["traction"], *state["motion"].tolist())
         return traces, left
-
-
-@kept
-def _plain(track: PrismTrack) -> PlainPrism:
-    """Return the second evaluation of a prism for the audit; all runs over it share it."""
-    return PlainPrism(track)
 
 
 def contact_of(found: Pass[PrismState]) -> PatchContact:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -222,44 +223,27 @@ _EXTENT = 4.0
 
 def view(parameters: RollingParameters) -> View:
     """Return the positions of results, which depend on dimensions and not on the mesh."""
-    if parameters.endless:
-        return _around_the_load(parameters.widest.half_width)
-    half, a = parameters.length / 2, parameters.half_width
-    edge = math.ceil(half + max(2 * a, parameters.spread))
-    places = round(edge / recorded_step(a))
+    p, a = parameters, parameters.widest.half_width
+    own: dict[str, Any] = {"stages": ("loaded", "unloaded")}
+    if p.endless:
+        x, s = (a * np.linspace(-_EXTENT, _EXTENT, count) for count in (161, 641))
+        station = np.zeros(1)
+    else:
+        edge = math.ceil(p.length / 2 + max(2 * a, p.spread))
+        places = round(edge / recorded_step(a))
+        x, s = (np.linspace(-edge, edge, count) for count in (places + 1, 2 * places + 1))
+        station = np.array([-10.0, 0.0, 10.0]) * min(1.0, p.length / 50.0)
+        own = {
+            "stages": ("loaded", "mid_track", "unloaded"), "loaded": "mid_track",
+            "following": ("loaded",),
+        }  # fmt: skip
     return View(
-        x=np.linspace(-edge, edge, places + 1),
-        y=-_pixels(a),
-        depth=_depths(a),
-        station=np.array([-10.0, 0.0, 10.0]) * min(1.0, parameters.length / 50.0),
-        s=np.linspace(-edge, edge, 2 * places + 1),
+        x=x,
+        y=-cells(5 * a, smallest=a / 64, ratio=1.05, largest=a / 16),
+        depth=np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)]),
+        station=station,
+        s=s,
         profile_body="half_space",
         surfaces={"half_space": "top"},
-        stages=("loaded", "mid_track", "unloaded"),
-        loaded="mid_track",
-        following=("loaded",),
+        **own,
     )
-
-
-def _around_the_load(a: float) -> View:
-    """Return the positions of results on an endless track for the half-width a [mm]."""
-    return View(
-        x=a * np.linspace(-_EXTENT, _EXTENT, 161),
-        y=-_pixels(a),
-        depth=_depths(a),
-        station=np.array([0.0]),
-        s=a * np.linspace(-_EXTENT, _EXTENT, 641),
-        profile_body="half_space",
-        surfaces={"half_space": "top"},
-        stages=("loaded", "unloaded"),
-    )
-
-
-def _pixels(a: float) -> Array:
-    """Return the depths of the map for the half-width a [mm]."""
-    return cells(5 * a, smallest=a / 64, ratio=1.05, largest=a / 16)
-
-
-def _depths(a: float) -> Array:
-    """Return the depths of profiles for the half-width a [mm]."""
-    return np.concatenate([np.linspace(0.0, 3 * a, 121), np.linspace(3.1 * a, 6 * a, 30)])

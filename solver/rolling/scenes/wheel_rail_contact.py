@@ -128,14 +128,7 @@ def _around(each: list[tuple[float, float]]) -> tuple[float, float]:
 
 @lru_cache(maxsize=4096)
 def _contact_of(touching: _Touching) -> ExpectedContact:
-    """Return where the wheel of one pass will touch the rail; it takes a tenth of a second.
-
-    Raises
-    ------
-    ModelError
-        for ``lateral_position``, if the wheel does not meet the running surface within its ends, or
-        if its flange is inside the rail
-    """
+    """Return where the wheel of one pass will touch the rail; it takes a tenth of a second."""
     p, section = touching, rail_of(touching)
     here = _Gap(p, section)
     here.check(p.lateral_position)

@@ -114,10 +114,7 @@ class RailSection(Rail):
 
     @property
     def running(self) -> Pair:
-        """Lengths along the outline between which it is the running surface with the sides [mm].
-
-        The first is on the right: z decreases in between.
-        """
+        """See `Rail.running`; the sides of the head are part of it."""
         left, right = self.places["heads"]
         return right, self.outline.length + left
 
