@@ -219,6 +219,23 @@ def _slopes(law: Law, states: PlasticState, before: Array, strain: Array) -> Arr
     return out
 
 
+def _linear_slopes(law: Law, after: PlasticState, before: Array, strain: Array) -> Array:
+    """Return the derivatives of plastic strain (n_points, 4, 9) of a law with linear hardening.
+
+    They are those of `_slopes`, without differences; ``after`` is the state at the end.
+    """
+    rule, double_shear = law.linear_hardening, 2 * law.elasticity.shear_modulus
+    assert rule is not None
+    tangent = law.respond(strain, after.unpacked(before)).tangent
+    by_strain = np.moveaxis(law.stiffness(4)[..., None] - tangent, 2, 0) / double_shear
+    flowed = after.plastic_strain - before[:4]
+    size = np.linalg.norm(flowed, axis=0)
+    way = np.divide(flowed, size, out=np.zeros_like(flowed), where=size > 0)
+    threshold = SQRT23 * rule.isotropic_modulus / (double_shear + 2 / 3 * rule.modulus)
+    by_flow = np.eye(4) - (1 + rule.prager_modulus / double_shear) * by_strain
+    return np.concatenate([by_flow, -threshold * way.T[..., None], by_strain], axis=2)
+
+
 class Flow:
     """A sweep in two dimensions, and the residual state of the half-plane behind it.
 
@@ -244,7 +261,10 @@ class Flow:
     @cached_property
     def _closing(self) -> Array:
         """Derivative (n_rows, 4, n) of the plastic strain behind by the last column's variables."""
-        slopes = _slopes(self._law, self.sweep.states, self._last, self._strain)[:, :4]
+        if self._law.linear_hardening:
+            slopes = _linear_slopes(self._law, self.after, self._last, self._strain)
+        else:
+            slopes = _slopes(self._law, self.sweep.states, self._last, self._strain)[:, :4]
         n = slopes.shape[2] - 4
         C = self._law.stiffness(4)
         by_state, by_strain = slopes[..., :n], slopes[..., n:]

@@ -592,7 +592,7 @@ def test_passes_in_space_have_the_derivatives_of_differences(
     assert "derivative" not in record.message
 
     def exactly(track: Any, law: Any, load: Any, *rest: Any, **how: Any) -> Any:
-        return search(track, law, load.exact, *rest, **how, tolerance=rail_passes.EXACT_ON_RAIL)
+        return search(track, law, load.exact, *rest, **how, tolerance=rail_passes.RailPasses.exact)
 
     monkeypatch.setattr(rail_passes, "search", exactly)
     for each in by:

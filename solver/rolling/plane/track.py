@@ -54,8 +54,6 @@ class Track:
     ----------
     part : the body
     rows : the points of the window
-    weights, virgin, strain : those of the rows, see `FlowRows`
-    solve : (condensed forces of plastic strain (m,)) -> displacements (m,) [mm]
 
     Raises
     ------
@@ -78,9 +76,7 @@ class Track:
         self._contact = CONTACT * reach * a
         self.part = Discretisation(half_space_body(*self._lines, self._contact, elasticity))
         self._window = h * ahead, h * behind, window_depth(a, reach)
-        self.rows = rows = FlowRows(self.part, self.operator, *self._window)
-        self.weights, self.virgin, self.strain = rows.weights, rows.virgin, rows.strain
-        self.solve = self.operator.solve
+        self.rows = FlowRows(self.part, self.operator, *self._window)
 
     @cached_property
     def mirrored(self) -> Discretisation:
@@ -112,15 +108,32 @@ class Track:
         inside = (x < ahead + edge) & (x > -behind - edge) & (y > -deep - edge)
         return CondensedTrack(self.part, np.flatnonzero(inside))
 
+    def virgin(self, law: Law) -> Layers:
+        """Return the state before any load."""
+        return self.rows.virgin(law)
+
     @property
     def at_rest(self) -> Array:
         """Displacements (m,) of the window without plastic strain and load: zero [mm]."""
         return np.zeros(len(self.operator.kept))
 
     @property
+    def weights(self) -> Array:
+        """Volume of the points (n_rows, n_columns) of the window [mm3]."""
+        return self.rows.weights
+
+    @property
     def rough(self) -> Self:
         """The track itself: see `PassedBody`."""
         return self
+
+    def solve(self, force: Array) -> Array:
+        """Return displacements (m,) for the condensed forces of plastic strain (m,) [mm]."""
+        return self.operator.solve(force)
+
+    def strain(self, u: Array) -> Array:
+        """Return the strains (n_rows, n_columns, 4) of displacements (m,)."""
+        return self.rows.strain(u)
 
     def flow(self, law: Law, before: Layers, added: Array, parts: int) -> RowFlow:
         """Return the flow of a material along the rows, see `RowFlow`."""
