@@ -126,6 +126,14 @@ def test_a_centred_wheelset_touches_rails_canted_by_1_in_40_on_their_crown():
         assert low < z[gap.argmin()] < high
 
 
-def test_points_that_are_no_profile_are_refused():
-    with pytest.raises(ModelError, match="points"):
-        measured(np.zeros((2, 5)))
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: crowned(-1.0), "radius"),
+        (lambda: conical(0.05, 0.0), "half_width"),
+        (lambda: measured(np.zeros((2, 5))), "points"),
+    ],
+)
+def test_bad_profiles_are_refused(make, field):
+    with pytest.raises(ModelError, match=field):
+        make()

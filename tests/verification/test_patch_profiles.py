@@ -144,6 +144,15 @@ def test_a_ball_rolls_in_the_groove_of_a_ring(ring: float) -> None:
     assert rest[:, inside, 2] / grid.spacing == pytest.approx(across[:, inside], abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("ring", "allowed"),
+    [(0.0, "positive, or below -5"), (-5.0, "positive, or below -5"), (np.nan, "a finite number")],
+)
+def test_a_ring_that_the_ball_does_not_fit_in_is_refused(ring: float, allowed: str) -> None:
+    with pytest.raises(ModelError, match=rf"track_radius = {ring}: must be {allowed}"):
+        ProfiledWheel(profile=np.zeros_like, radius=5.0, elasticity=STEEL, track_radius=ring)
+
+
 def test_a_yawed_wheel_touches_behind_on_its_flange_and_slips_across() -> None:
     """By R tan(slope) tan(yaw), as its heading turns away from the flange; creepage grows there.
 
@@ -213,8 +222,10 @@ def test_spin_turns_about_the_axis_of_the_wheel() -> None:
     assert abs(one.shear).max() > 0.01 * hertz.peak_pressure
 
 
-def test_a_wheel_narrower_than_the_surface_is_refused() -> None:
+def test_wheels_that_do_not_fit_are_refused() -> None:
     grid = pressed(ellipse(1.0, 1.0), 0.2, 0.2).grid
+    with pytest.raises(ModelError, match="yaw = 1"):
+        ProfiledWheel(profile=np.zeros_like, radius=460.0, elasticity=STEEL, yaw=1.0)
     ends = ProfiledWheel(
         profile=lambda z: np.where(z < 0.1, 0.0, np.inf), radius=460.0, elasticity=STEEL
     )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from solver.errors import LimitLoad, ModelError, Spins, WindowTooSmall
+from solver.materials import Elasticity
 from solver.model.friction import ContactPlaces, Coulomb, FrictionLaw, Value, through
 from solver.rolling.rail.friction_cone import OPEN, SLIP, STICK
 from solver.rolling.rail.patch import RollingPatch
@@ -180,6 +181,7 @@ def test_a_contact_at_the_end_of_the_grid_is_refused() -> None:
 def test_bad_input_is_named() -> None:
     grid = pressed(ellipse(1.0, 1.0), 0.2, 0.2).grid
     wheel = ProfiledWheel(profile=np.zeros_like, radius=1e3, elasticity=STEEL)
+    rigid = Elasticity(youngs_modulus=np.inf, poisson_ratio=0.3)
     usual = {
         "grid": grid, "compliance": surface_of(grid), "wheel": wheel, "friction": 0.1, "force": 1.0,
     }  # fmt: skip
@@ -187,6 +189,9 @@ def test_bad_input_is_named() -> None:
         ({"friction": 11.0}, "friction = 11.0: must be at least 0 and at most 10"),
         ({"friction": Worn()}, "must not depend on slip or plastic strain on a track without ends"),
         ({"force": 0.0}, "force = 0.0: must be greater than 0"),
+        ({"compliance": np.ones((5, 15, 3, 15, 3))}, "must be (15 or more, 15, 3, 15, 3)"),
+        ({"compliance": 0 * surface_of(grid), "wheel": replace(wheel, elasticity=rigid)},
+         "surface and wheel must not both be rigid"),
         ({"wheel": replace(wheel, profile=lambda z: np.where(z < 0, np.nan, 0))},
          "must be finite at every vertex"),
         ({"grid": replace(grid, ahead=2e3)},
@@ -195,6 +200,17 @@ def test_bad_input_is_named() -> None:
     for change, message in cases:
         with pytest.raises(ModelError, match=re.escape(message)):
             wheel_on(**{**usual, **change}).solve(np.zeros((grid.stations, len(grid.z), 3)))
+    for name, value, message in (
+        ("z", grid.z[::-1], "must increase, 3 positions or more"),
+        ("y", grid.y[1:], "must have 15 values, as z"),
+        ("angle", grid.angle + 2.0, "must lie between -pi/2 and pi/2"),
+        ("spacing", 0.0, "spacing = 0.0: must be greater than 0"),
+        ("stations", 2, "stations = 2: must be at least 3"),
+    ):
+        with pytest.raises(ModelError, match=re.escape(message)):
+            replace(grid, **{name: value})
+    with pytest.raises(ModelError, match=re.escape("radius = -1.0: must be greater than 0")):
+        replace(wheel, radius=-1.0)
 
 
 def test_more_than_friction_is_a_clear_error() -> None:

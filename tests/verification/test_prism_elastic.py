@@ -578,8 +578,31 @@ def test_each_resultant_has_its_far_field(resultant: int) -> None:
     assert np.abs(alone[0]).max() > 2 * np.abs(found[0][0]).max()
 
 
-def test_a_span_longer_than_the_levels_is_refused() -> None:
+def test_bad_input_is_told_with_what_is_allowed() -> None:
     section, zone = block(1.5, reach=8.0)
+    mesh = section.plane.body.mesh
+    with pytest.raises(ModelError, match=r"springs = .*must hold the prism"):
+        Section(mesh, STEEL, springs={"bottom": (0.0, 1.0, 1.0)})
+    with pytest.raises(ModelError, match=r"springs\.bottom = .*three numbers"):
+        Section(mesh, STEEL, springs={"bottom": (1.0, -1.0, 1.0)})
+    with pytest.raises(ModelError, match=r"supports\.left = 'w'"):
+        Section(mesh, STEEL, supports={"left": "w"})
+    for change, told in (
+        ({"stations": 7}, "stations = 7: must be even"),
+        ({"length": -1.0}, "length = -1.0: must be positive"),
+        ({"window": 9}, "window = 9: must be in 1 to 8"),
+        ({"window": 5, "behind": [1.0]}, "behind = 1: must have 3 factors"),
+        ({"zone": np.zeros_like(zone)}, "must choose some of"),
+        ({"surface": rows_of(section, np.array([0]))}, "surface = 0: this row has nodes outside"),
+        ({"surface": sparse.csr_array(np.ones((1, section.n)))}, "surface = 0: this row is along"),
+    ):
+        given = {"zone": zone, "length": 10.0, "stations": 8, **change}
+        with pytest.raises(ModelError, match=told):
+            Modes(section, **given)
+    held = Modes(section, zone, 10.0, 8, surface=rows_of(section, on_top(section, 0.1)))
     carrying = Modes(section, zone, 10.0, 8, surface=rows_of(section, on_top(section, 1.5)))
-    with pytest.raises(ModelError, match=r"span = 500\.0: must be at most 426\.667 mm with 2"):
-        FarField(carrying, 0.0, levels=2, span=500.0)
+    for span, told in ((0.0, "must be positive"), (500.0, "must be at most 426.667 mm with 2")):
+        with pytest.raises(ModelError, match=f"span = {span}: {told}"):
+            FarField(carrying, 0.0, levels=2, span=span)
+    with pytest.raises(ModelError, match="surface = '3 rows': must carry forces"):
+        FarField(held, 0.0)

@@ -345,3 +345,45 @@ def test_a_back_stress_of_one_s_own_rolls_by_its_word():
         [sys.executable, "-c", OWN], env=setting, capture_output=True, text=True, check=False
     )
     assert run.stdout.strip() == "True", run.stderr
+
+
+class SweptTo:
+    """A sweep that ends in given states, whose changes are given."""
+
+    def __init__(self, end):
+        self.states = end.unpacked(end.packed[..., None])
+
+    def along(self, change):
+        """Return no changes along the rows, and those of the last column."""
+        return change[:, None, :4], change
+
+
+@pytest.mark.parametrize("hardening", LINEAR)
+def test_the_state_behind_has_the_derivative_of_differences(hardening, monkeypatch):
+    """Of plastic strain by all internal variables, in rows of which many flow as they unload."""
+    monkeypatch.setattr(flow, "sweep_of", lambda law, strain, start, parts: SweptTo(start))
+    law = linear(hardening)
+    random = np.random.default_rng(0)
+
+    def shear(size):
+        values = size * random.normal(size=(4, 40))
+        values[:3] -= values[:3].mean(axis=0)
+        return values
+
+    plastic = shear(3e-3)
+    last = law.initial(40, 4).unpacked(np.vstack([plastic, 0.8 * np.linalg.norm(plastic, axis=0)]))
+
+    def behind(state):
+        return flow.Flow(law, np.zeros((40, 2, 4)), state, 1)
+
+    here = behind(last)
+    flows = here.after.accumulated > last.accumulated
+    assert 10 < flows.sum() < 30
+    way = np.concatenate([shear(1e-3), 1e-3 * random.normal(size=(1, 40))])
+    high, low = (
+        behind(last.unpacked(last.packed + step * way)).after.plastic_strain
+        for step in (1e-5, -1e-5)
+    )
+    exact = (high - low) / 2e-5
+    _, found = here.along(way.T)
+    assert np.abs(found - exact.T).max() < 1e-6 * np.abs(exact).max()

@@ -157,6 +157,13 @@ def largest(values: Array) -> float:
     return float(values.max(initial=0.0))
 
 
+def deviation(strain: Array) -> float:
+    """Return the largest norm of the deviators of Mandel strains (..., n_components)."""
+    mean = strain[..., :3].mean(axis=-1)
+    square = (strain**2).sum(axis=-1) - 3 * mean**2
+    return float(np.sqrt(np.maximum(square.max(), 0.0)))
+
+
 def _flat(values: Array) -> Array:
     """Return values (n, n_points) of points in rows (n, n_rows, n_columns)."""
     return values.reshape(len(values), -1)

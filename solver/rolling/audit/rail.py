@@ -15,12 +15,13 @@ from solver.rolling.audit.flow import (
     INFLOW,
     STEADINESS,
     AuditedFlow,
+    deviation,
     difference,
     judged,
     largest,
 )
 from solver.rolling.audit.plain_rail import PlainPrism
-from solver.rolling.passing import Pass, deviation
+from solver.rolling.passing import Pass
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.friction_cone import NORMAL, TANGENTS
 from solver.rolling.rail.half_space import half_space

@@ -129,6 +129,9 @@ _RATIO = 8
 """Ratio of the lengths of two levels, and of a length to the width of the spread load on it."""
 _CUT = 6.0
 """Product of k and width above which waves are neglected: the transform is below 3e-6 there."""
+_LOOSE = 1e-9
+"""The surface rows cannot carry a resultant if the smallest singular value of their motions, of 1
+at the farthest node, is below this."""
 _ALONG = np.array([True, False, False, False, True, True])
 """Whether motions of a section, as `Section.mean_motions`, are along x; resultants are the first
 four of them."""
@@ -163,15 +166,18 @@ class FarField:
     Raises
     ------
     ModelError
-        if the levels are shorter than a span
+        if the surface rows cannot carry all four resultants, or the levels are shorter than a span
     """
 
     def __init__(self, modes: Modes, x: float, levels: int = 4, span: float | None = None) -> None:
         self._modes, self._spacing = modes, modes.length / modes.stations
         self._motions = modes.rows @ modes.section.rigid[modes.unknowns]
+        size = np.abs(modes.section.rigid).max(axis=0)
+        if np.linalg.matrix_rank(self._motions / size, tol=_LOOSE) < len(size):
+            allowed = "must carry forces along x, y and z and a moment about x"
+            raise ModelError("surface", f"{len(self._motions)} rows", allowed)
         section = modes.section
-        n = section.rigid.shape[1]
-        forces = np.zeros((section.n, n))
+        forces = np.zeros((section.n, len(size)))
         # the least forces on the rows with these resultants
         forces[modes.unknowns] = modes.rows.T @ np.linalg.pinv(self._motions).T
         shares = _shares(modes.length, levels)
@@ -180,6 +186,7 @@ class FarField:
         every = forces if span is None else np.hstack([forces, section.mean_motions.T])
         basis, found = sampled_answers(section, every, self._k)
         self._basis = basis
+        n = len(size)
 
         def own(shares: dict[int, float]) -> _SectionLoad:
             return _SectionLoad(found[..., :n], self._k, _listed(shares, waves), _ALONG[:n])
@@ -309,6 +316,8 @@ def _clamped(
 
 def _level_of(length: float, levels: int, span: float) -> tuple[int, float]:
     """Return the first level longer than a span, and the distance of loads beyond its ends."""
+    if not span > 0:
+        raise ModelError("span", span, "must be positive [mm]")
     for level in range(1, levels + 1):
         period = length * _RATIO**level
         if period >= _ROOM * span:

@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from solver.errors import ModelError
 from solver.late import late
 from solver.linear import solvers as linear
 from solver.linear.schur import Elimination, with_block
@@ -70,6 +71,11 @@ class Modes:
     rows : (n_rows, m) sparse, ``surface`` on the unknowns of the zone
     along : (n_rows,) whether a row is along x
     carrying : (6 n_points,) whether a row of B0 and B1 carries i
+
+    Raises
+    ------
+    ModelError
+        if the zone is empty, a number out of range, or a row mixed or outside the zone
     """
 
     def __init__(
@@ -85,6 +91,7 @@ class Modes:
         surface: sparse.csr_array | None = None,
     ) -> None:
         window = stations if window is None else window
+        _check(section, zone, length, stations, window, behind)
         self.section, self.length, self.stations = section, length, stations
         self.precision: np.dtype[Any] = np.dtype(float)
         self.wavenumbers = -2 * np.pi / length * np.arange(stations // 2 + 1)
@@ -101,9 +108,7 @@ class Modes:
         areas = sparse.diags_array(np.tile(self.weights, 6))
         self._force0 = sparse.csc_array(self.B0.T @ areas)
         self._force1 = sparse.csc_array(self.B1.T @ areas)
-        rows = sparse.csr_array((0, section.n)) if surface is None else surface
-        self.along = abs(rows) @ (np.arange(section.n) % 3 == I_AXIS).astype(float) > 0
-        self.rows = sparse.csr_array(rows[:, self.unknowns])
+        self._set_rows(surface, zone)
         # equal forces at equal distances leave every loads-th wave
         self._loads = np.where(np.arange(stations // 2 + 1) % loads, 0.0, float(loads))
         self.behind = np.asarray(behind, dtype=float)
@@ -123,6 +128,21 @@ class Modes:
         for name in ("_into", "_into_behind", "_back"):
             setattr(other, name, tuple(each.astype(kind) for each in getattr(self, name)))
         return other
+
+    def _set_rows(self, surface: sparse.csr_array | None, zone: Bools) -> None:
+        """Restrict the surface rows to the zone."""
+        section = self.section
+        rows = sparse.csr_array((0, section.n)) if surface is None else sparse.csr_array(surface)
+        axis = np.arange(section.n) % 3 == I_AXIS
+        size = abs(rows)
+        parts = np.stack([size @ axis.astype(float), size @ (~axis).astype(float)])
+        for row in np.flatnonzero((parts > 0).all(axis=0))[:1]:
+            raise ModelError("surface", int(row), "this row is along x and across it: must be one")
+        outside = ~np.isin(np.arange(section.n), section.dofs[zone])
+        for row in np.flatnonzero(size @ outside.astype(float) > 0)[:1]:
+            raise ModelError("surface", int(row), "this row has nodes outside the zone")
+        self.along = parts[0] > 0
+        self.rows = sparse.csr_array(rows[:, self.unknowns])
 
     def _set_transforms(self, window: int, behind: Array) -> None:
         """Set the matrices between stations and amplitudes: (window, 2 waves), real, imaginary."""
@@ -316,6 +336,28 @@ def superposed(
         some = amplitudes[results][:, :, loads]
         out[np.ix_(results, loads)] = np.tensordot(some, share[:, None] * factor, axes=(1, 0))
     return out
+
+
+def _check(
+    section: Section,
+    zone: Bools,
+    length: float,
+    stations: int,
+    window: int,
+    behind: Sequence[float] | Array,
+) -> None:
+    """Raise `ModelError` for bad input of `Modes`."""
+    elements = len(section.weights)
+    if zone.shape != (elements,) or zone.dtype != bool or not zone.any():
+        raise ModelError("zone", zone.shape, f"must choose some of {elements} elements")
+    if not (np.isfinite(length) and length > 0):
+        raise ModelError("length", length, "must be positive [mm]")
+    if stations < 2 or stations % 2:
+        raise ModelError("stations", stations, "must be even and positive")
+    if not 0 < window <= stations:
+        raise ModelError("window", window, f"must be in 1 to {stations}, the number of stations")
+    if len(behind) not in (0, stations - window):
+        raise ModelError("behind", len(behind), f"must have {stations - window} factors, or none")
 
 
 def _factorised(

@@ -24,7 +24,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from solver.errors import NoContact, Spins, WindowTooSmall
+from solver.errors import ModelError, NoContact, Spins, WindowTooSmall
 from solver.linear.solvers import one_thread
 from solver.model.friction import BoundLines, FrictionLaw, pressure_lines
 from solver.rolling.load import FULL_SLIP, spinning
@@ -89,7 +89,11 @@ class RollingPatch(PatchLoad):
         return self.changed(settled=_EXACT)
 
     def __post_init__(self) -> None:
-        """Without friction leave moment and lateral force out."""
+        """Raise `ModelError` for arrays and numbers that do not fit."""
+        n, m = self.grid.stations, len(self.grid.z)
+        shape = self.compliance.shape
+        if shape[1:] != (m, 3, m, 3) or len(self.compliance) < n:
+            raise ModelError("compliance", shape, f"must be ({n} or more, {m}, 3, {m}, 3)")
         if not self._lines.rough.any():
             object.__setattr__(self, "load", replace(self.load, drive=None, lateral_force=None))
 
@@ -115,7 +119,10 @@ class RollingPatch(PatchLoad):
     def _influence(self) -> Influence:
         """Slip and gap by tractions."""
         with one_thread():
-            return Influence(self._kernel(_apart(self.grid, self.compliance, self.wheel)))
+            found = Influence(self._kernel(_apart(self.grid, self.compliance, self.wheel)))
+        if not found.own()[:, NORMAL, NORMAL].min() > 0:
+            raise ModelError("compliance", 0.0, "surface and wheel must not both be rigid")
+        return found
 
     @cached_property
     def _axes(self) -> Array:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval
 from scipy import sparse
 
+from solver.errors import ModelError
 from solver.fem.surface import extract
 from solver.mesh.edges import shape_derivatives, shape_functions
+from solver.parameters import Length, check
 from solver.rolling.rail.section import Section
 from solver.typing import Array
 
@@ -77,6 +81,8 @@ class Hats:
         return np.asarray((first[:, None] + (last - first)[:, None] * SHARES).ravel())
 
 
+_FEWEST = 3
+"""Least number of vertices and of stations: the outermost ones must not touch."""
 _CUBIC = (
     [(t * (1 - t) ** 2, -(t**2) * (1 - t)) for t in SHARES],
     [((1 - t) * (1 - 3 * t), t * (3 * t - 2)) for t in SHARES],
@@ -105,9 +111,21 @@ class PatchGrid:
     z: Array
     y: Array
     angle: Array
-    spacing: float
+    spacing: Length
     ahead: float
-    stations: int
+    stations: Annotated[int, Interval(ge=_FEWEST)]
+
+    def __post_init__(self) -> None:
+        """Raise `ModelError` for positions that are not a surface."""
+        check(self)
+        m = len(self.z)
+        if m < _FEWEST or not (np.diff(self.z) > 0).all():
+            raise ModelError("z", self.z, f"must increase, {_FEWEST} positions or more")
+        for name in ("y", "angle"):
+            if getattr(self, name).shape != (m,):
+                raise ModelError(name, getattr(self, name), f"must have {m} values, as z")
+        if not (np.abs(self.angle) < np.pi / 2).all():
+            raise ModelError("angle", self.angle, "must lie between -pi/2 and pi/2")
 
     @property
     def x(self) -> Array:
@@ -166,6 +184,11 @@ class RunningSurface:
     ----------
     z, y : (m,) positions of the vertices [mm]
     angle : (m,) slope angle of the surface at the vertices [rad]
+
+    Raises
+    ------
+    ModelError
+        if the edges are no chain along which z increases
     """
 
     def __init__(self, section: Section, boundary: str) -> None:
@@ -175,6 +198,8 @@ class RunningSurface:
         if plane.X[0, edges[0, 0]] > plane.X[0, edges[-1, 1]]:
             edges = edges[::-1, [1, 0, 2]]
         self.z, self.y = plane.X[:, np.append(edges[:, 0], edges[-1, 1])]
+        if not (np.diff(self.z) > 0).all():
+            raise ModelError("boundary", boundary, "must be a chain along which z increases")
         self._edges, self._n = edges, plane.X.shape[1]
         ends = np.stack([plane.X[:, edges] @ shape_derivatives(np.array(xi), 3) for xi in (-1, 1)])
         slopes = np.arctan2(ends[:, 1], ends[:, 0])  # (2, m - 1): at both ends of each edge

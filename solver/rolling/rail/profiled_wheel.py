@@ -7,13 +7,17 @@ gap to the straight prism is then part of the gap, and its turning part of the s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Interval, Unit
 
 from solver.errors import ModelError
 from solver.materials import Elasticity
+from solver.parameters import Infinite, Length, check
 from solver.rolling.rail.patch_grid import PatchGrid
 from solver.typing import Array
 
@@ -49,11 +53,18 @@ class ProfiledWheel:
     """
 
     profile: Callable[[Array], Array]
-    radius: float
+    radius: Length
     elasticity: Elasticity
     middle: float = 0.0
-    yaw: float = 0.0
-    track_radius: float = np.inf
+    yaw: Annotated[float, Interval(gt=-math.pi / 4, lt=math.pi / 4), Unit("rad")] = 0.0
+    track_radius: float | Infinite = np.inf
+
+    def __post_init__(self) -> None:
+        """Raise `ModelError` for radii that do not fit, or a yaw of a quarter turn."""
+        check(self)
+        if not (self.track_radius > 0 or -self.track_radius > self.radius):
+            allowed = f"must be positive, or below {-self.radius:g}"
+            raise ModelError("track_radius", self.track_radius, allowed)
 
     def lowest(self, z: Array) -> Array:
         """Return the position x (...) where the wheel is lowest over a line along x at ``z`` [mm].

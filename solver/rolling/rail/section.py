@@ -26,6 +26,7 @@ from scipy import sparse
 from scipy.linalg import null_space
 from skfem import Mesh
 
+from solver.errors import ModelError
 from solver.fem.assembly import Assembly
 from solver.fem.deformation import strain_operator
 from solver.fem.nodes import Nodes
@@ -43,6 +44,9 @@ I_COMPONENTS = (3, 5)
 """The Mandel components xy and zx, which carry the factor i."""
 _EDGE_POINTS = 3
 """Number of points of an edge for springs: exact on straight edges."""
+_LOOSE = 1e-9
+"""The supports and springs leave a rigid motion free if the smallest singular value of its held
+displacements is below this."""
 
 
 class Section:
@@ -55,8 +59,7 @@ class Section:
     mesh : scikit-fem mesh of quadrilaterals; its first coordinate is z, its second y [mm]
     elasticity : elastic constants
     springs : boundary -> stiffness of its springs along x, y and z [N/mm3], the same for all waves
-    supports : boundary -> displacement components that are held, letters of ``xyz``; with the
-        springs they hold the prism along x, y and z and about x
+    supports : boundary -> displacement components that are held, letters of ``xyz``
 
     Attributes
     ----------
@@ -72,7 +75,8 @@ class Section:
     Raises
     ------
     ModelError
-        if the mesh is bad
+        if the mesh is bad, a boundary unknown, a stiffness negative, or a motion of the whole prism
+        is not held
     """
 
     def __init__(
@@ -101,12 +105,41 @@ class Section:
         # d/dx is i k: of a component that carries i it makes -k
         self.B1 = strain_operator(N, np.stack([N, nothing, nothing]), self.weights, "")
         self.B1[:, :, 0] *= -1.0
-        self.springs = {name: np.array(each) for name, each in (springs or {}).items()}
-        free = np.ones(self.n, dtype=bool)
-        for boundary, axes in (supports or {}).items():
-            for axis in axes:
-                free[3 * plane.boundary_nodes(boundary) + AXES.index(axis)] = False
-        self.free: Ints = np.flatnonzero(free)
+        self.springs = {name: self._checked(name, each) for name, each in (springs or {}).items()}
+        held = self._held(supports or {})
+        self.free = np.setdiff1d(np.arange(self.n), held)
+        self._check_held(held)
+
+    def _held(self, supports: Mapping[str, str]) -> Ints:
+        """Return the unknowns that supports hold."""
+        held = [np.zeros(0, dtype=np.int64)]
+        for boundary, axes in supports.items():
+            self.plane.body.facets(boundary, "supports")
+            if not axes or not set(axes) <= set(AXES):
+                raise ModelError(f"supports.{boundary}", axes, "must be letters of xyz")
+            nodes = self.plane.boundary_nodes(boundary)
+            held += [3 * nodes + AXES.index(axis) for axis in axes]
+        return np.unique(np.concatenate(held))
+
+    def _checked(self, boundary: str, stiffness: tuple[float, float, float]) -> Array:
+        """Return the stiffness (3,) of springs, or raise `ModelError`."""
+        along = np.array(stiffness, dtype=float)
+        if along.shape != (3,) or not (np.isfinite(along) & (along >= 0)).all():
+            allowed = "must be three numbers, not negative: along x, y and z [N/mm3]"
+            raise ModelError(f"springs.{boundary}", stiffness, allowed)
+        self.plane.body.facets(boundary, "springs", outer=True)
+        return along
+
+    def _check_held(self, held: Ints) -> None:
+        """Raise `ModelError` if neither supports nor springs hold a motion of the whole prism."""
+        motions = self.rigid / np.abs(self.rigid).max(axis=0)
+        rows = [motions[held]]
+        for boundary, along in self.springs.items():
+            nodes = self.plane.boundary_nodes(boundary)
+            rows += [motions[3 * nodes + axis] for axis in range(3) if along[axis] > 0]
+        if np.linalg.matrix_rank(np.concatenate(rows), tol=_LOOSE) < motions.shape[1]:
+            allowed = "must hold the prism, with its supports: along x, y, z and about x"
+            raise ModelError("springs", sorted(self.springs), allowed)
 
     @cached_property
     def rigid(self) -> Array:

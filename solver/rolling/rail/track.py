@@ -14,6 +14,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from solver.errors import ModelError
 from solver.materials.elasticity import Elasticity
 from solver.materials.law import Law
 from solver.rolling.rail.far_field import FarField
@@ -33,15 +34,14 @@ class PrismTrack:
     section : the cross-section
     zone : (n_elements,) elements that may yield
     boundary : chain of edges of the zone on which the load acts
-    length : L, after which the waves repeat, at least the window [mm]
+    length : L, after which the waves repeat [mm]
     spacing : distance h of stations [mm]; L is an even number of them
     ahead, behind : the window extends from x = ahead to x = -behind [mm]
-    reach : half the length of the surface where the load may act [mm]; at most what the window has
-        ahead and behind, half of it with a far field
+    reach : half the length of the surface where the load may act [mm]
     levels : levels of the far field; with 0 the prism repeats itself
     loads : number of equal loads on the length, at equal distances; plastic strain is that of one
-    span : length of a prism that is clamped at both ends, the load in its middle [mm], with a far
-        field; None if it is endless
+    span : length of a prism that is clamped at both ends, the load in its middle [mm]; None if it
+        is endless
 
     Attributes
     ----------
@@ -53,6 +53,11 @@ class PrismTrack:
     loads : number of equal loads on the length
     rim : numbers of the points beside elements outside the zone, which must not yield
     initial : initial stress, None without
+
+    Raises
+    ------
+    ModelError
+        for lengths that do not fit together
     """
 
     def __init__(
@@ -72,7 +77,12 @@ class PrismTrack:
     ) -> None:
         stations, before = round(length / spacing), round(ahead / spacing)
         window = before + round(behind / spacing) + 1
+        if window > stations:
+            raise ModelError("length", length, f"must be at least {window * spacing:g} mm")
         near = int(round(reach / spacing, 6))
+        if (2 if levels else 1) * near > min(before, window - 1 - before):
+            allowed = "must be at most what the window has ahead and behind, with far field half"
+            raise ModelError("reach", reach, allowed)
         self.section, self.boundary, self.before = section, boundary, before
         self._near, self.loads = near, loads
         surface = RunningSurface(section, boundary)
@@ -81,6 +91,8 @@ class PrismTrack:
             section, zone, length, stations, window=window,
             behind=_fading(stations - window), loads=loads, surface=surface.rows(self.grid),
         )  # fmt: skip
+        if span is not None and not levels:
+            raise ModelError("span", span, "needs levels of far field")
         self.far = FarField(self.modes, -before * spacing, levels, span) if levels else None
         self._width = np.tile(self.grid.hats.width, 3)
         self.weights = np.repeat(spacing * self.modes.weights[:, None], window, axis=1)

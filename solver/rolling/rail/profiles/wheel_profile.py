@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from solver.errors import ModelError
 from solver.rolling.rail.profiles.points import checked_points
 from solver.typing import Array
 
@@ -122,6 +123,8 @@ def s1002() -> WheelProfile:
 
 def conical(slope: float, half_width: float = 70.0) -> WheelProfile:
     """Return a cone: its height is slope times z, up to ``half_width`` on either side [mm]."""
+    if not 0 < half_width < math.inf:
+        raise ModelError("half_width", half_width, "must be positive [mm]")
     return WheelProfile((-half_width, half_width), (_polynomial(0.0, slope),))
 
 
@@ -130,6 +133,8 @@ def crowned(radius: float, half_width: float = 70.0) -> WheelProfile:
 
     It ends at ``half_width``, or before at nine tenths of the radius.
     """
+    if not radius > 0:
+        raise ModelError("radius", radius, "must be positive [mm]")
     if math.isinf(radius):
         return conical(0.0, half_width)
     end = min(half_width, 0.9 * radius)
