@@ -96,7 +96,7 @@ class AuditedBody:
     def linked(self) -> Array:
         """Nodal forces (n_nodes, dim) of links on the whole body [N]."""
         number, state = self._system.part(self.name), self._converged.state
-        force = self._system.links.on_part(number, state.links, self.part.n)
+        force = self._system.links.at(state.u).on_part(number, state.links, self.part.n)
         return vectors(self.part.on_whole(force), self.plain.part.dim).T
 
     @cached_property

@@ -306,7 +306,7 @@ def _turned(system: System, state: State) -> Array:
     """
     links, found = system.links, np.zeros(len(system.links))
     for k, link in enumerate(system.model.links):
-        if link.rigid is None:
+        if link.rigid is None or system.full(link.slave[0]).body.large:
             continue
         number, reference = system.part(link.slave[0]), system.part(link.rigid)
         part, rigid, rows = system.parts[number], system.parts[reference], links.rows[number]

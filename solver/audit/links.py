@@ -104,7 +104,8 @@ def least_energy(system: System, force: float) -> float:
 def turned(system: System, converged: Converged) -> tuple[str, ...]:
     """Return messages on rigid bodies that rotate boundaries too far for links."""
     found = []
-    for name in dict.fromkeys(link.rigid for link in system.model.links if link.rigid):
+    small = (link for link in system.model.links if not _is_large(system, link))
+    for name in dict.fromkeys(link.rigid for link in small if link.rigid):
         angle = abs(_motion(system, name, converged).rotation)
         if not angle <= _SMALL:
             found.append(
@@ -124,22 +125,37 @@ def _motion(system: System, name: str, converged: Converged) -> RigidMotion:
     return _rigid(system, name).motion_of(converged.state.u[system.part(name)])
 
 
+def _is_large(system: System, link: Link) -> bool:
+    """Whether a link turns with its rigid body, exactly."""
+    return system.full(link.slave[0]).body.large
+
+
+def _carried(system: System, link: Link, X: Array, converged: Converged) -> tuple[Array, Array]:
+    """Return the motion (2, n) of places X with the rigid body of a link, and its axes (2, 2)."""
+    assert link.rigid is not None
+    x, y, angle = _motion(system, link.rigid, converged)
+    arm = X - np.reshape(_rigid(system, link.rigid).body.centre, (2, 1))
+    if not _is_large(system, link):
+        return np.array([x - angle * arm[1], y + angle * arm[0]]), np.eye(2)
+    turn = np.exp(1j * angle)
+    moved = (turn - 1) * (arm[0] + 1j * arm[1]) + (x + 1j * y)
+    axes = np.array([[turn.real, turn.imag], [-turn.imag, turn.real]])
+    return np.array([moved.real, moved.imag]), axes
+
+
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:
     """Return the resultant (2,) [N] and the moment [N mm] of a link on a body."""
-    own = np.where(system.links.whose == k, converged.state.links, 0.0)
-    return _resultant(system, own, name)
-
-
-def _resultant(system: System, own: Array, name: str) -> tuple[Array, Array]:
-    """Return the resultant (2,) [N] and the moment [N mm] on a body of link forces (c,) [N]."""
-    links, number = system.links, system.part(name)
-    part = system.parts[number]
-    force = links.on_part(number, own, part.n)
+    state, number, part = converged.state, system.part(name), system.parts[system.part(name)]
+    own = np.where(system.links.whose == k, state.links, 0.0)
+    force = system.links.at(state.u).on_part(number, own, part.n)
+    deformed = _is_large(system, system.model.links[k])
     if isinstance(part, RigidPart):
-        x, y = part.frame.centre
+        x, y = part.frame.centre + deformed * state.u[number][:2]
         turning = force[2] * part.frame.radius + x * force[1] - y * force[0]
         return force[:2], np.asarray(turning)
     nodal, X = vectors(part.on_whole(force), 2), system.full(name).X
+    if deformed:
+        X = X + vectors(system.displacement(name, state), 2)
     return nodal.sum(axis=1), np.asarray((X[0] * nodal[1] - X[1] * nodal[0]).sum())
 
 
@@ -176,11 +192,10 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
         slave = _opposite(slave, master)
         others.append(_facing(slave.X, master)[1])
     X, u, area, *_ = slave
+    frame = np.eye(2)
     if link.rigid is not None:
-        x, y, angle = _motion(system, link.rigid, converged)
-        centre = _rigid(system, link.rigid).body.centre
-        arm = X - np.reshape(centre, (2, 1))
-        others.append(np.array([x - angle * arm[1], y + angle * arm[0]]))
+        carried, frame = _carried(system, link, X, converged)
+        others.append(carried)
     size = max(float(np.abs(each).max()) for each in (u, *others))
     size = max(size, LEAST * _moved_by(system, link.slave[0], converged.state.force_scale))
     if not size:
@@ -189,7 +204,7 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
     if link.local or (sprung and link.master is None):
         return _misfit_at_nodes(system, k, converged, size)
     axes = [1] if _is_ring(system, link) else list(link.axes)
-    jump = (u - sum(others, np.zeros_like(u)))[axes]
+    jump = (frame @ (u - sum(others, np.zeros_like(u))))[axes]
     if link.master is None and not link.distributed:
         jump = jump - jump[:, :1] if link.rigid is None else jump
         return float(np.abs(jump).max()) / size
@@ -223,15 +238,14 @@ def _misfit_at_nodes(system: System, k: int, converged: Converged, size: float) 
     if link.local:
         ways = np.array([[y, -x] if link.components == "normal" else [x, y]]) / np.hypot(x, y)
     if link.rigid is not None:
-        across, up, angle = _motion(system, link.rigid, converged)
-        centre = _rigid(system, link.rigid).body.centre
-        arm = X - np.reshape(centre, (2, 1))
-        u = u - np.array([across - angle * arm[1], up + angle * arm[0]])
+        carried, frame = _carried(system, link, X, converged)
+        u, ways = u - carried, np.einsum("ji,kjn->kin", frame, ways)
     jump = (ways * u).sum(axis=1)
     if np.isfinite(link.stiffness):
         own = np.where(system.links.whose == k, converged.state.links, 0.0)
         part = system.parts[system.part(name)]
-        force = part.on_whole(system.links.on_part(system.part(name), own, part.n))
+        joins = system.links.at(converged.state.u)
+        force = part.on_whole(joins.on_part(system.part(name), own, part.n))
         force = vectors(force, 2)[:, nodes] / link.stiffness
         off = area * (jump[:, None] * ways).sum(axis=0) + force
         return float(np.hypot(*off).sum()) / area.sum() / size

@@ -250,7 +250,7 @@ class PlainBody:
             if self.body.turns(load) and u is not None:
                 x = self.part.X + vectors(u, self.part.dim)
                 each = [self._on_boundary(load.push, b, x) for b in load.boundaries]
-                at_factor_one = np.sum(each, axis=0)
+                at_factor_one = sum(each, self._on_volume(load, x))
             total += load_factor(load.amplitude, time) * at_factor_one
             for boundary in load.boundaries if load.moves else ():
                 push = partial(load.push_at, time)
@@ -310,26 +310,27 @@ class PlainBody:
             start = np.concatenate([start, start + width])
         return total
 
-    def _on_volume(self, load: Load) -> Array:
-        """Return the `moments` (3, 2) of a load's force per volume.
+    def _on_volume(self, load: Load, x_nodes: Array | None = None) -> Array:
+        """Return the `moments` (3, 2) of a load's force per volume, its nodes at X or at x (2, n).
 
         The cells of integration begin smaller than in the solver, which may miss narrow features.
         """
         if load.body_force(self.points) is None:
             return np.zeros((3, 2))
 
-        def force(x: Array) -> Array:
-            given = np.asarray(load.body_force(x.reshape(2, -1)))
+        def force(x: Array, at: Array | None = None) -> Array:
+            given = np.asarray(load.body_force((x if at is None else at).reshape(2, -1)))
             return np.broadcast_to(given, (2, x[0].size)).reshape(x.shape) * self._depth(x)
 
         basis, rule = self.part.basis, np.polynomial.legendre.leggauss(6)
         cells = smooth_cells(basis, force, _PARTS)
         local, x, area = cells.points(rule, rule)
-        given, total = force(x) * area, np.zeros((3, 2))
-        for k, own in enumerate(basis.element_dofs):
-            nodal = (given * np.asarray(basis.elem.lbasis(local, k)[0])).sum(axis=2)
-            total += self.moments(nodal, self.part.X[:, own[cells.element]])
-        return total
+        nodes = self.part.X if x_nodes is None else x_nodes
+        each = [(nodes[:, own[cells.element]], np.asarray(basis.elem.lbasis(local, k)[0]))
+                for k, own in enumerate(basis.element_dofs)]  # fmt: skip
+        at = x if x_nodes is None else sum(of[:, :, None] * shape for of, shape in each)
+        given = force(x, at) * area
+        return np.asarray(sum(self.moments((given * shape).sum(axis=2), of) for of, shape in each))
 
     def elastic_energy(self, stress: Array, time: float) -> float:
         """Return the energy of a Mandel stress (4, n_points) at a time [N mm]."""

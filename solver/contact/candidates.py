@@ -261,9 +261,10 @@ def _places(vertices: Sequence[Ints]) -> list[slice]:
 
 def no_candidates(system: System, u: tuple[Array, ...], links: Array) -> Candidates:
     """Return the candidates of separated bodies: the links alone."""
-    empty, off = np.zeros(0), system.links.off(u, links)
+    joins = system.links.at(u)
+    empty, off = np.zeros(0), joins.off(u, links)
     none = tuple(np.zeros(0, dtype=int) for _ in system.interfaces)
-    rows = system.links.rows
+    rows = joins.rows
     covered = tuple(empty for _ in system.interfaces)
     covers = tuple(
         Cover(np.zeros(len(i.slave_surface.edges) + 1), np.zeros(len(i.slave_surface.edges)))
@@ -279,7 +280,7 @@ def no_candidates(system: System, u: tuple[Array, ...], links: Array) -> Candida
         none, lines, off, empty, links, status, empty, rows, turned, covered, covers, gaps,
         slips, np.inf,
         leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
-        links=system.links,
+        links=joins,
     )  # fmt: skip
 
 
@@ -319,12 +320,12 @@ def find_candidates(
     pushes = tuple(np.zeros(part.n) for part in system.parts)
     n = sum(len(v) for v in vertices)
     frictional = any(interface.rough for interface in system.interfaces)
-    m = (2 * n if frictional else n) + len(system.links)
+    joins = system.links.at(u)
+    m = (2 * n if frictional else n) + len(joins)
     motion, uncounted, unsure, beyond = np.zeros(m), np.zeros(n), np.zeros(n), np.inf
-    last = slice(m - len(system.links), m)
-    motion[last] = system.links.off(u, links)
+    motion[m - len(joins) :] = joins.off(u, links)
     lines: list[BoundLines] = []
-    pieces = [_below(m, rows) for rows in system.links.rows]
+    pieces = [_below(m, rows) for rows in joins.rows]
     slips: list[Array] = []
     turned = [np.zeros((n, part.rigid.shape[1])) for part in system.parts]
     for pair, (interface, pairing, at, before, normal) in enumerate(
@@ -385,7 +386,7 @@ def find_candidates(
         leaving=leaving,
         pushes=pushes,
         holds=system.holds(start.time, time),
-        links=system.links,
+        links=joins,
         turning=_turning(system, u, acting, pairings, contacts, vertices),
     )
 

@@ -20,10 +20,11 @@ from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactRows, ContactSolution, OnParts, joined
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
+from solver.fem.large import LargeDiscretisation
 from solver.fem.loads import comparing
-from solver.fem.nodes import Dofs
+from solver.fem.nodes import Dofs, vectors
 from solver.fem.part import Part
-from solver.fem.rigid import RigidPart
+from solver.fem.rigid import MovingFrame, RigidPart
 from solver.fem.surface import Surface
 from solver.linear.solvers import Singular
 from solver.model.model import Model
@@ -48,11 +49,43 @@ class Links(OnParts):
     rows : for each part, the derivatives C (c, ...) on its unknowns; None if no link acts on it
     compliance : (c,) compliance of springs [mm/N], 0 if the link is rigid
     whose : (c,) number of the link that a condition belongs to
+    shift : (c,) violation at the displacements of `at`, less that by ``rows`` [mm]
     """
 
     rows: tuple[ContactRows | None, ...]
     compliance: Array
     whose: Ints
+    shift: Array
+    _each: tuple[_LinkRows, ...]
+    _kept: Ints | slice
+
+    @classmethod
+    def of(
+        cls, each: tuple[_LinkRows, ...], parts: int, kept: Ints | slice,
+        u: Sequence[Array] | None = None,
+    ) -> Links:  # fmt: skip
+        """Return the ``kept`` conditions of each link, of a number of parts, at displacements."""
+        ends = np.cumsum([0, *(len(own.compliance) for own in each)])
+        pieces: list[list[ContactRows]] = [[] for _ in range(parts)]
+        shift = np.zeros(ends[-1])
+        for k, own in enumerate(each):
+            here, rows = slice(ends[k], ends[k + 1]), own.rows
+            if own.follows is not None and u is not None:
+                rows, off = own.follows.at(u)
+                shift[here] = off - sum(r.block @ u[number][r.dofs] for number, r in rows)
+            for number, one in rows:
+                block = np.zeros((ends[-1], one.block.shape[1]))
+                block[here] = one.block
+                pieces[number].append(ContactRows(one.dofs, block[kept]))
+        compliance = np.concatenate([np.zeros(0), *(own.compliance for own in each)])[kept]
+        whose = np.repeat(np.arange(len(each)), np.diff(ends))[kept]
+        return cls(tuple(map(joined, pieces)), compliance, whose, shift[kept], each, kept)
+
+    def at(self, u: Sequence[Array]) -> Links:
+        """Return the conditions at displacements ``u``: some turn with their rigid bodies."""
+        if all(own.follows is None for own in self._each):
+            return self
+        return Links.of(self._each, len(self.rows), self._kept, u)
 
     def __len__(self) -> int:
         """Return the number of conditions."""
@@ -65,7 +98,7 @@ class Links(OnParts):
 
     def off(self, u: Sequence[Array], forces: Array) -> Array:
         """Return the violation (c,) of the conditions by unknowns and forces [mm]."""
-        out = self.compliance * forces
+        out = self.compliance * forces + self.shift
         for own, rows in zip(u, self.rows, strict=True):
             if rows is not None:
                 out = out + rows.block @ own[rows.dofs]
@@ -189,34 +222,57 @@ def links_of(
     ModelError
         if surfaces do not face each other, or prescribed motions contradict supports or other links
     """
-    pieces: list[list[ContactRows]] = [[] for _ in parts]
-    compliance, places, whose = [np.zeros(0)], [np.zeros((2, 0))], [np.zeros(0, dtype=int)]
-    each = [_conditions(f"links[{k}]", link, parts, names, surfaces)
-            for k, link in enumerate(model.links)]  # fmt: skip
-    ends = np.cumsum([0, *(len(own.compliance) for own in each)])
-    for k, own in enumerate(each):
-        for number, rows in own.rows:
-            block = np.zeros((ends[-1], rows.block.shape[1]))
-            block[ends[k] : ends[k + 1]] = rows.block
-            pieces[number].append(ContactRows(rows.dofs, block))
-        compliance.append(own.compliance)
-        places.append(own.X)
-        whose.append(np.full(len(own.compliance), k))
-    made = Links(
-        tuple(joined(own) for own in pieces), np.concatenate(compliance), np.concatenate(whose)
+    each = tuple(
+        _conditions(f"links[{k}]", link, parts, names, surfaces)
+        for k, link in enumerate(model.links)
     )
-    kept = _independent(made, parts, np.hstack(places))
-    cut = tuple(r and ContactRows(r.dofs, r.block[kept]) for r in made.rows)
-    return Links(cut, made.compliance[kept], made.whose[kept])
+    X = np.hstack([np.zeros((2, 0)), *(own.X for own in each)])
+    return Links.of(
+        each, len(parts), _independent(Links.of(each, len(parts), slice(None)), parts, X)
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class _LinkRows:
-    """The conditions of one link: rows by number of the part, compliance (c,), positions (2, c)."""
+    """The conditions of one link: rows by number of the part, compliance (c,), positions (2, c).
+
+    ``rows`` are those before loading. If ``follows`` is given, they turn.
+    """
 
     rows: list[tuple[int, ContactRows]]
     compliance: Array
     X: Array
+    follows: _Follower | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Follower:
+    """Conditions on the displacements of a boundary in the frame of a rigid body, for any rotation.
+
+    Attributes
+    ----------
+    slave, reference : numbers of the boundary's part and of the rigid body
+    dofs, X : (2 n,) unknowns and (2, n) positions of the boundary's nodes
+    block : (c, 2 n) the conditions by displacements in the frame
+    """
+
+    slave: int
+    reference: int
+    frame: MovingFrame
+    dofs: Ints
+    X: Array
+    block: Array
+
+    def at(self, u: Sequence[Array]) -> tuple[list[tuple[int, ContactRows]], Array]:
+        """Return derivatives by the unknowns, and violations (c,) [mm]."""
+        q, moved = u[self.reference], vectors(u[self.slave][self.dofs], 2)
+        inside = self.frame.within(q, self.X, moved)
+        block = self.block.reshape(len(self.block), -1, 2) @ self.frame.turned(q).T
+        block = block.reshape(self.block.shape)
+        motion = self.frame.rows(q, block, self.frame.passing(self.X + inside))
+        rows = [(self.reference, ContactRows(np.arange(3), -motion)),
+                (self.slave, ContactRows(self.dofs, block))]  # fmt: skip
+        return rows, self.block @ inside.T.ravel()
 
 
 def _conditions(
@@ -225,6 +281,7 @@ def _conditions(
 ) -> _LinkRows:  # fmt: skip
     number, slave = names.index(link.slave[0]), surfaces[link.slave]
     rows: list[tuple[int, ContactRows]] = []
+    follows: _Follower | None = None
     if link.master is None:
         along_each = _ways(link, slave)
         nodes = np.tile(np.arange(len(slave.nodes)), len(along_each))
@@ -258,6 +315,9 @@ def _conditions(
             X = np.tile(X.mean(axis=1, keepdims=True), len(block))
             areas = np.full(len(block), np.inf)
         rows.append((reference, ContactRows(np.arange(3), -motion)))
+        if isinstance(parts[number], LargeDiscretisation) and part.body.turns and not link.master:
+            dofs = parts[number].surface(slave).dofs
+            follows = _Follower(number, reference, part.frame, dofs, slave.X, block)
     elif link.master is None and not link.grounded:  # the slave moves as one
         count = len(slave.nodes)
         first = np.arange(len(block)) // count * count
@@ -266,10 +326,11 @@ def _conditions(
         block, areas, X = block[others_], areas[others_], X[:, others_]
     rows.append((number, ContactRows(parts[number].surface(slave).dofs, block)))
     if np.isinf(link.stiffness):
-        return _LinkRows(rows, np.zeros(len(areas)), X)
+        return _LinkRows(rows, np.zeros(len(areas)), X, follows)
     acts = areas > _LITTLE * areas.max()
     rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
-    return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts])
+    follows = follows and replace(follows, block=follows.block[acts])
+    return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts], follows)
 
 
 def _ways(link: Link, slave: Surface) -> list[Array]:

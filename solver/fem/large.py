@@ -1,4 +1,4 @@
-"""A body of large strain: logarithmic strain, and pressures that follow its boundary.
+"""A body of large strain: logarithmic strain, and loads that follow its displacements.
 
 Its nodes, points, law and contact are those of a body of small strain. No element of large strain
 keeps the stiffness of the undeformed body. If only the elements of a region have large strain, the
@@ -12,6 +12,7 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
+from skfem import Basis
 
 from solver.fem.deformation import Deformation, PartResponse
 from solver.fem.discretisation import Discretisation
@@ -97,10 +98,34 @@ class Follower:
                              self._at[:, None, :]), K)  # fmt: skip
 
 
-def following(part: Discretisation) -> list[Follower]:
-    """Return the loads that follow the boundaries of a body, were its strain large."""
+class Spinning:
+    """The forces of a load per volume that is linear in the position, as the centrifugal force."""
+
+    def __init__(self, part: Discretisation, load: Load) -> None:
+        self._part, self.load = part, load
+        basis = Basis(part.body.mesh, part.basis.elem, intorder=2 * part.basis.elem.maxdeg)
+        N = np.array([np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis])
+        volumes = basis.dx * part.measure(np.asarray(basis.global_coordinates()))
+        force = np.asarray(load.body_force(np.stack([np.zeros(2), np.ones(2)], axis=1)))
+        mass = np.einsum("aep,bep,ep->eab", N, N, volumes)
+        self._M = np.kron(mass, np.diag(force[:, 1] - force[:, 0]))
+
+    def change(self, u: Array, time: float) -> Array:
+        """Return the change of the nodal forces (n,) by the displacements at a time [N]."""
+        dofs = self._part.dofs
+        each = self.load.factor(time) * np.einsum("eij,ej->ei", self._M, u[dofs])
+        return np.asarray(np.bincount(dofs.ravel(), each.ravel(), self._part.n))
+
+    def add_stiffness(self, elements: Array, u: Array, time: float) -> None:
+        """Add its stiffness to the matrices of all elements [N/mm]."""
+        elements -= self.load.factor(time) * self._M
+
+
+def following(part: Discretisation) -> list[Follower | Spinning]:
+    """Return the loads that follow the displacements of a body, were its strain large."""
     loads = [load for load in part.body.every_load if load.follows and not load.moves]
-    return [Follower(part, load, boundary) for load in loads for boundary in load.boundaries]
+    spun = [Spinning(part, load) for load in loads if not load.boundaries]
+    return [*spun, *(Follower(part, load, of) for load in loads for of in load.boundaries)]
 
 
 class LargeDiscretisation(Discretisation):
@@ -110,7 +135,7 @@ class LargeDiscretisation(Discretisation):
     """Angle [rad] of the last of its rigid motions, if it is a rotation."""
 
     @cached_property
-    def _following(self) -> list[Follower]:
+    def _following(self) -> list[Follower | Spinning]:
         return [each for each in following(self) if self.body.turns(each.load)]
 
     def _measure(self, values: Array, gradients: Array, *, mean: bool) -> Deformation:
@@ -190,7 +215,8 @@ class LargeDiscretisation(Discretisation):
             return None
         forces = self.external(time) + contact
         for each in self._following:
-            forces -= each.nodal(each.before, time)
+            if isinstance(each, Follower):
+                forces -= each.nodal(each.before, time)
         turned = np.zeros_like(self.rigid)
         turned[:, 2] = self._unit * (vectors(forces, 2)[::-1] * [[-1], [1]]).T.ravel()
         return turned

@@ -170,6 +170,11 @@ class MovingFrame:
         from_centre = self.turned(q) @ (X - self.centre[:, None] + d)
         return np.asarray(from_centre + (self.centre + q[:2])[:, None] - X)
 
+    def within(self, q: Array, X: Array, u: Array) -> Array:
+        """Return the displacements (2, n) in the frame of points X displaced by u in space [mm]."""
+        from_centre = X + u - (self.centre + q[:2])[:, None]
+        return np.asarray(self.turned(q).T @ from_centre - (X - self.centre[:, None]))
+
     def passing(self, X: Array) -> Array:
         """Return the derivative (2, n) of the positions X by the arc, in the frame."""
         x, y = X - self.centre[:, None]

@@ -53,10 +53,10 @@ def _released(system: System, before: Converged, now: Converged) -> float:
     """
     if not now.separated:
         return 0.0
-    work, links = 0.0, before.state.links
+    work, links, joins = 0.0, before.state.links, system.links.at(before.state.u)
     moves = zip(before.state.u, now.state.u, before.contact_forces, strict=True)
     for k, (u0, u1, force) in enumerate(moves):
-        work -= float((force - system.links.on_part(k, links, len(force))) @ (u1 - u0)) / 2
+        work -= float((force - joins.on_part(k, links, len(force))) @ (u1 - u0)) / 2
     return work
 
 

@@ -17,7 +17,7 @@ from solver.mesh.elements import element_type
 from solver.mesh.opening import faces_of
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
-from solver.model.loads import Centrifugal, Displacement, Kinematics, Load, Pressure
+from solver.model.loads import Displacement, Kinematics, Load, Pressure
 from solver.parameters import Thickness, check
 from solver.tensors import AXES
 
@@ -138,20 +138,20 @@ class Body:
         return large
 
     def turns(self, load: Load) -> bool:
-        """Whether a load follows the deformation of its boundaries, where strain is large."""
-        if not (self.large and load.follows):
-            return False
-        facets = map(self.facets, load.boundaries)
-        return any(self.large_elements[self.mesh.f2t[0, own]].any() for own in facets)
+        """Whether a load follows the displacements of what it acts on, where strain is large."""
+        return self.large and load.follows and bool(self.large_elements[self._under(load)].any())
+
+    def _under(self, load: Load) -> np.ndarray:
+        """Return the elements on which a load acts: those at its boundaries, or all."""
+        facets = [self.facets(boundary) for boundary in load.boundaries]
+        return (
+            self.mesh.f2t[0, np.concatenate(facets)] if facets else np.arange(self.mesh.nelements)
+        )
 
     @property
     def of_small_strain(self) -> list[str]:
         """Names of what it has and bodies of large strain do not have yet."""
-        loads = (
-            load.name
-            for load in self.every_load
-            if load.removes or load.moves or isinstance(load, Centrifugal)
-        )
+        loads = (load.name for load in self.every_load if load.removes or load.moves)
         return [*(["axle"] if self.axle is not None else []), *loads]
 
     def _check_large(self) -> None:
@@ -161,9 +161,7 @@ class Body:
             raise ModelError(name, "given with large strain", allowed)
         large = self.large_elements
         for load in filter(self.turns, self.every_load):
-            facets = [self.facets(boundary) for boundary in load.boundaries]
-            inside = large[self.mesh.f2t[0, np.concatenate(facets)]]
-            if not inside.all():
+            if not large[self._under(load)].all():
                 allowed = f"must push inside or outside of region {self.large_region!r}, not both"
                 raise ModelError(load.name, load.boundaries, allowed)
 

@@ -53,8 +53,9 @@ class Load:
     amplitude : load factor over time; by default the time itself
     varies : whether loads of this kind change with time, and have an amplitude
     outside : whether the boundaries of this kind must lie on the outside of the body
-    follows : whether `push` acts on the deformed boundary of a body of large strain; otherwise, as
-        in bodies of small strain, on the boundary before loading
+    follows : whether it acts at the displaced places of a body of large strain: `push` on the
+        deformed boundary, or, without boundaries, `body_force`, then linear in the position.
+        Otherwise, as in bodies of small strain, it acts on the body before loading
     """
 
     amplitude: Amplitude | None = None
@@ -299,6 +300,7 @@ class Centrifugal(Load):
     speed: Annotated[float, Interval(ge=0.0), Unit("rad/s")]
     axis: Axis = "y"
     centre: tuple[Coordinate, Coordinate] = (0.0, 0.0)
+    follows: ClassVar[bool] = True
 
     def check(self, kinematics: Kinematics) -> None:
         """Raise `ModelError` for another axis than its own."""

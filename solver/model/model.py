@@ -11,7 +11,7 @@ from solver.materials.doubts import doubts
 from solver.mesh.elements import element_type
 from solver.model.body import Body
 from solver.model.pairs import ContactPair, Link
-from solver.model.rigid import Moved, Pushed, RigidBody
+from solver.model.rigid import Pushed, RigidBody
 from solver.model.singular import SingularPoint
 from solver.parameters import check
 
@@ -89,20 +89,15 @@ class Model:
                 )
                 raise ModelError("element", body.element, allowed)
         for k, link in enumerate(self.links):
-            turns = link.local or (link.rigid is not None and self._turns(link.rigid))
-            if turns and large & {of for of, _ in link.sides}:
+            rigid = link.rigid and self.body(link.rigid)
+            turns = isinstance(rigid, RigidBody) and rigid.turns and link.master is not None
+            if (link.local or turns) and large & {of for of, _ in link.sides}:
                 allowed = (
-                    "must not move along normals or with a body that rotates: the strain of the "
-                    "body it moves is large. Prescribe rotation = 0, or leave normal out"
+                    "must not move along normals, nor relative to a master with a body that "
+                    "rotates: the strain of the body it moves is large. Leave normal or the master "
+                    "out"
                 )
                 raise ModelError(f"links[{k}]", link.rigid or link.components, allowed)
-
-    def _turns(self, name: str) -> bool:
-        """Whether a rigid body may rotate."""
-        body = self.body(name)
-        return isinstance(body, RigidBody) and (
-            not isinstance(body.rotation, Moved) or body.rotation.value != 0
-        )
 
     def _check_solids(self) -> None:
         """Raise `ModelError` for contact, links and rigid bodies in a model of bodies in space."""

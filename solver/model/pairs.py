@@ -102,7 +102,8 @@ class Link:
     slave : body and boundary
     master : body and boundary to which the slave is tied; their nodes need not match
     rigid : the rigid body whose motion the slave follows; with a master, the motion of the slave
-        relative to the master, such as the shortening of a bolt. Rotations are small
+        relative to the master, such as the shortening of a bolt. Rotations are small, but of any
+        size if the strain of the slave is large: components and springs then turn with the body
     components : components of the displacement in the conditions: along the axes, or along the
         normal or the tangent of the slave at each node. At a corner the normal is the mean of both
         sides

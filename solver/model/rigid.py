@@ -148,6 +148,11 @@ class RigidBody:
         return self.x, self.y, self.rotation
 
     @property
+    def turns(self) -> bool:
+        """Whether it may rotate."""
+        return isinstance(self.rotation, Pushed) or self.rotation.value != 0
+
+    @property
     def material(self) -> Law:
         """The law of a rigid material."""
         return _RIGID

@@ -1,0 +1,233 @@
+"""Boundaries that rigid bodies turn by large angles: strips coiled, bent sheets, turned blocks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_bvp
+from scipy.optimize import brentq
+
+from solver import (
+    Amplitude,
+    Body,
+    Link,
+    Material,
+    Model,
+    ModelError,
+    Moved,
+    PathControl,
+    Pushed,
+    RigidBody,
+    Solution,
+    Stage,
+    solve,
+)
+from solver.mesh import grid
+from solver.model.loads import Centrifugal, Temperature
+from tests.verification.test_large_bodies import ELASTIC, block
+
+pytestmark = pytest.mark.solves
+
+Array = NDArray[np.float64]
+STRIP, THIN = 20.0, 0.2
+E = 2e5
+TILTED = Link(slave=("b", "right"), rigid="end")
+
+
+def coiled(rotation: Moved | Pushed, steps: int, link: Link = TILTED) -> Solution:
+    """Return a strip clamped at its left end, the right one turned by a rigid body."""
+    strip = block((0, STRIP), (-THIN / 2, THIN / 2), (40, 1), element="quad8",
+                  kinematics="plane_stress", supports={"left": "xy"},
+                  material=Material(youngs_modulus=E, poisson_ratio=0.0))  # fmt: skip
+    end = RigidBody(name="end", centre=(STRIP, 0.0), x=Pushed(), y=Pushed(), rotation=rotation)
+    model = Model(bodies=(strip,), rigid=(end,), links=(link,))
+    return solve(model, stages=[Stage(name="bent", target=1.0, steps=steps)])
+
+
+@pytest.mark.parametrize("distributed", [False, True])
+@pytest.mark.parametrize("by", ["rotation", "moment"])
+def test_a_strip_is_coiled_into_a_circle(by: str, distributed: bool) -> None:
+    """Its end is where a circle of the same length ends; the moment is E I angle / length."""
+    angle = 3.0
+    moment = E * THIN**3 / 12 * angle / STRIP
+    rotation = Moved(value=angle) if by == "rotation" else Pushed(value=moment)
+    link = Link(slave=("b", "right"), rigid="end", distributed=distributed)
+    found = coiled(rotation, 10, link)
+    motion = found.motion("end", "bent")
+    assert motion.rotation == pytest.approx(angle, rel=1e-3)
+    assert found.reaction("end", "bent")[2] == pytest.approx(moment, rel=1e-3)
+    radius = STRIP / angle
+    assert motion.x == pytest.approx(radius * np.sin(angle) - STRIP, abs=1e-3 * STRIP)
+    assert motion.y == pytest.approx(radius * (1 - np.cos(angle)), abs=1e-3 * STRIP)
+    audit = found.audit("bent")
+    assert audit.passed
+    assert not audit.outside
+    assert audit.figures["audit_links"] < 1e-9
+
+
+def test_springs_turn_with_the_body_that_holds_them() -> None:
+    """Springs on the turned boundary bear the moment k I sin(angle between body and boundary)."""
+    angle, stiffness = 2.0, 1e4
+    link = Link(slave=("b", "right"), rigid="end", stiffness=stiffness)
+    found = coiled(Moved(value=angle), 10, link)
+    second = THIN**3 / 12
+    back = brentq(lambda b: E / STRIP * (angle - b) - stiffness * np.sin(b), 0.0, 2.0)
+    assert 0.5 < back < 1.5
+    moment = found.reaction("end", "bent")[2]
+    assert moment == pytest.approx(stiffness * second * np.sin(back), rel=5e-3)
+    assert found.audit("bent").passed
+
+
+# -- a sheet bent beyond yield -------------------------------------------------------------------
+
+
+THICK, YIELD, BENT = 1.0, E / 500, 5.0
+LENGTH = 0.5 * THICK
+
+
+def sheet(parts: int, steps: int, back: float) -> Solution:
+    """Return a wide sheet bent to a radius of 5 thicknesses, then turned back by an angle."""
+    steel = Material(youngs_modulus=E, poisson_ratio=0.3, yield_stress=YIELD)
+    body = block((0, LENGTH), (-THICK / 2, THICK / 2), (1, parts), material=steel,
+                 element="quad8", supports={"left": "x"})  # fmt: skip
+    turned = Moved(value=LENGTH / BENT)
+    end = RigidBody(name="end", centre=(LENGTH, 0.0), x=Pushed(), rotation=turned)
+    wall = RigidBody(name="wall")
+    links = (
+        Link(slave=("b", "right"), rigid="end", components="x"),
+        Link(slave=("b", "left"), rigid="wall", components="y", distributed=True),
+    )
+    stages = [Stage(name="bent", target=1.0, steps=steps),
+              Stage(name="released", target=1.0 - back, steps=2)]  # fmt: skip
+    return solve(Model(bodies=(body,), rigid=(end, wall), links=links), stages=stages)
+
+
+def curved(found: Solution, stage: str) -> tuple[Array, Array, Array]:
+    """Return radii (n,), hoop and radial stress (n,) of the nodes on the left, where x is hoop."""
+    system, converged = found.system, found.stages[stage]
+    x = system.full("b").X + system.displacement("b", converged.state).reshape(-1, 2).T
+    motion = found.motion("end", stage)
+    centre = (LENGTH + motion.x) / np.tan(motion.rotation)
+    at = np.flatnonzero(np.abs(system.full("b").X[0]) < 1e-9)
+    at = at[np.argsort(-x[1, at])]
+    stress = found.stress("b", stage)
+    return centre - x[1, at], stress[0, at], stress[1, at]
+
+
+def test_a_bent_sheet_has_the_stress_and_the_springback_of_closed_forms() -> None:
+    """R. Hill, The Mathematical Theory of Plasticity (1950), chapter XI.3: rigid-plastic sheet.
+
+    Its release is that of the elastic curved bar (S. Timoshenko, J.N. Goodier, Theory of
+    Elasticity, 1951, article 27).
+    """
+    shear = YIELD / np.sqrt(3)
+    a, b = BENT - THICK / 2, BENT + THICK / 2
+    n = (b**2 - a**2) ** 2 - 4 * a**2 * b**2 * np.log(b / a) ** 2
+    moment = shear * THICK**2 / 2
+    back = 8 * moment * (b**2 - a**2) / n * (1 - 0.3**2) / E
+    found = sheet(20, 10, back)
+    r, hoop, radial = curved(found, "bent")
+    a, b = r.min(), r.max()
+    neutral = np.sqrt(a * b)
+    assert found.reaction("end", "bent")[2] == pytest.approx(shear * (b - a) ** 2 / 2, rel=2e-3)
+    stretched = r > neutral
+    across = -2 * shear * np.where(stretched, np.log(b / r), np.log(r / a))
+    along = across + np.where(stretched, 2 * shear, -2 * shear)
+    plastic = np.abs(r - neutral) > 0.1 * THICK
+    assert np.abs(radial - across)[plastic].max() < 0.01 * YIELD
+    assert np.abs(hoop - along)[plastic].max() < 0.01 * YIELD
+    # almost no moment is left, so that the stress differs from the plastic one by the elastic one
+    left = found.reaction("end", "released")[2]
+    assert abs(left) < 0.03 * moment
+    released = found.reaction("end", "bent")[2] - left
+    n = (b**2 - a**2) ** 2 - 4 * a**2 * b**2 * np.log(b / a) ** 2
+    logs = b**2 * np.log(r / b) + a**2 * np.log(a / r)
+    ring = a**2 * b**2 / r**2 * np.log(b / a)
+    elastic = 4 * released / n * (-ring + logs + b**2 - a**2)
+    _, remains, _ = curved(found, "released")
+    assert np.abs(remains - hoop + elastic).max() < 0.01 * YIELD
+    for stage in ("bent", "released"):
+        assert found.audit(stage).passed
+
+
+# -- a turned block ------------------------------------------------------------------------------
+
+
+def test_stress_turns_with_a_block_whose_ends_are_turned() -> None:
+    """Heated between its ends it flows; turned by 1 rad it has the same stress in its own axes."""
+    steel = Material(youngs_modulus=E, poisson_ratio=0.3, yield_stress=200.0,
+                     hardening="isotropic", hardening_ratio=0.01)  # fmt: skip
+    first, later = (Amplitude([0, 1, 2], [0, middle, 1]) for middle in (1, 0))
+    body = block((0, 2), (0, 1), (4, 2), material=steel,
+                 loads=(Temperature(expansion=1e-5, rise=300.0, amplitude=first),))  # fmt: skip
+    turned = RigidBody(name="frame", centre=(-1.0, 3.0), rotation=Moved(value=1.0, amplitude=later))
+    links = tuple(Link(slave=("b", side), rigid="frame") for side in ("left", "right"))
+    stages = [Stage(name="hot", target=1.0, steps=4), Stage(name="turned", target=2.0, steps=4)]
+    found = solve(Model(bodies=(body,), rigid=(turned,), links=links), stages=stages)
+    (xx, yy, zz, xy), after = (
+        found.system.state("b", found.stages[stage]).stress for stage in ("hot", "turned")
+    )
+    assert found.plastic_strain("b", "hot").max() > 1e-3
+    c, s = np.cos(1.0), np.sin(1.0)
+    shear = xy / np.sqrt(2)
+    exact = np.stack([
+        c**2 * xx + s**2 * yy - 2 * c * s * shear, s**2 * xx + c**2 * yy + 2 * c * s * shear, zz,
+        np.sqrt(2) * (c * s * (xx - yy) + (c**2 - s**2) * shear),
+    ])  # fmt: skip
+    assert np.abs(after - exact).max() < 1e-9 * E
+    assert found.audit("turned").passed
+
+
+def test_what_cannot_turn_is_refused() -> None:
+    body = block((0, 2), (0, 1), (4, 2))
+    other = block((2, 4), (0, 1), (4, 2), name="c")
+    end = RigidBody(name="end", rotation=Moved(value=1.0))
+    fields: dict[str, Any]
+    for fields in ({"components": "normal"}, {"master": ("c", "left")}):
+        link = Link(slave=("b", "right"), rigid="end", **fields)
+        with pytest.raises(ModelError, match=r"must not move along normals, nor relative to a mas"):
+            Model(bodies=(body, other), rigid=(end,), links=(link,))
+
+
+# -- a rotor -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("element", ["quad8", "quad4"])
+def test_a_rod_that_spins_is_stretched_by_the_force_at_its_present_places(element: str) -> None:
+    """The force per length is density x speed^2 x present radius: a boundary value problem."""
+    modulus, pull, length = 1000.0, 2.2, 10.0
+    rod = block((0, length), (0, 1), (10, 1), element=element, kinematics="plane_stress",
+                material=Material(youngs_modulus=modulus, poisson_ratio=0.0),
+                supports={"left": "x", "bottom": "y"},
+                loads=(Centrifugal(density=1e-6, speed=np.sqrt(pull / 1e-6)),))  # fmt: skip
+    found = solve(Model(bodies=(rod,)), load=1.0, control=PathControl(load_step=0.25))
+
+    def stretched(nominal: Array) -> Array:
+        stretch = np.ones_like(nominal)
+        for _ in range(30):
+            slope = modulus * (1 - np.log(stretch)) / stretch**2
+            stretch = stretch - (modulus * np.log(stretch) / stretch - nominal) / slope
+        return stretch
+
+    at = np.linspace(0, length, 21)
+    exact = solve_bvp(
+        lambda _, y: np.stack([stretched(y[1]), -pull * y[0]]),
+        lambda left, right: np.array([left[0], right[1]]),
+        at, np.stack([at, np.zeros(21)]), tol=1e-9,
+    )  # fmt: skip
+    tip = exact.y[0][-1] - length
+    assert found.displacement("b", "loaded")[0].max() == pytest.approx(tip, rel=1e-3)
+    assert tip > 0.09 * length
+    audit = found.audit()
+    assert not audit.violations
+
+
+def test_a_rotor_spins_wholly_inside_or_outside_the_region() -> None:
+    body: dict[str, Any] = {"loads": (Centrifugal(density=1e-8, speed=10.0),),
+                            "material": ELASTIC, "element": "quad4", "strain": "large"}  # fmt: skip
+    mesh = grid(np.linspace(0, 2, 5), np.linspace(0, 1, 3)).with_subdomains({"near": np.arange(2)})
+    with pytest.raises(ModelError, match="must push inside or outside of region 'near'"):
+        Body(name="b", mesh=mesh, large_region="near", **body)
