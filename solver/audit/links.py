@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.audit.plain import LEAST, LEAST_ENERGY
-from solver.contact.state import Converged
+from solver.contact.state import Converged, State
 from solver.contact.system import System
 from solver.fem.nodes import vectors
 from solver.fem.rigid import RigidMotion, RigidPart
@@ -145,16 +145,26 @@ def _carried(system: System, link: Link, X: Array, converged: Converged) -> tupl
 
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:
     """Return the resultant (2,) [N] and the moment [N mm] of a link on a body."""
-    state, number, part = converged.state, system.part(name), system.parts[system.part(name)]
-    own = np.where(system.links.whose == k, state.links, 0.0)
+    own = np.where(system.links.whose == k, converged.state.links, 0.0)
+    moves = _is_large(system, system.model.links[k])
+    return resultant(system, converged.state, own, name, moves=moves)
+
+
+def resultant(
+    system: System, state: State, own: Array, name: str, *, moves: bool = False
+) -> tuple[Array, Array]:
+    """Return the resultant (2,) [N] and the moment [N mm] on a body of link forces (c,) [N].
+
+    Forces act at the places before loading, or at the present ones if the body ``moves``.
+    """
+    number, part = system.part(name), system.parts[system.part(name)]
     force = system.links.at(state.u).on_part(number, own, part.n)
-    deformed = _is_large(system, system.model.links[k])
     if isinstance(part, RigidPart):
-        x, y = part.frame.centre + deformed * state.u[number][:2]
+        x, y = part.frame.centre + moves * state.u[number][:2]
         turning = force[2] * part.frame.radius + x * force[1] - y * force[0]
         return force[:2], np.asarray(turning)
     nodal, X = vectors(part.on_whole(force), 2), system.full(name).X
-    if deformed:
+    if moves:
         X = X + vectors(system.displacement(name, state), 2)
     return nodal.sum(axis=1), np.asarray((X[0] * nodal[1] - X[1] * nodal[0]).sum())
 

@@ -70,8 +70,8 @@ class Links(OnParts):
         shift = np.zeros(ends[-1])
         for k, own in enumerate(each):
             here, rows = slice(ends[k], ends[k + 1]), own.rows
-            if own.follows is not None and u is not None:
-                rows, off = own.follows.at(u)
+            if own.framed is not None and u is not None:
+                rows, off = own.framed.at(u)
                 shift[here] = off - sum(r.block @ u[number][r.dofs] for number, r in rows)
             for number, one in rows:
                 block = np.zeros((ends[-1], one.block.shape[1]))
@@ -83,7 +83,7 @@ class Links(OnParts):
 
     def at(self, u: Sequence[Array]) -> Links:
         """Return the conditions at displacements ``u``: some turn with their rigid bodies."""
-        if all(own.follows is None for own in self._each):
+        if all(own.framed is None for own in self._each):
             return self
         return Links.of(self._each, len(self.rows), self._kept, u)
 
@@ -236,17 +236,17 @@ def links_of(
 class _LinkRows:
     """The conditions of one link: rows by number of the part, compliance (c,), positions (2, c).
 
-    ``rows`` are those before loading. If ``follows`` is given, they turn.
+    ``rows`` are those before loading. If ``framed`` is given, they turn.
     """
 
     rows: list[tuple[int, ContactRows]]
     compliance: Array
     X: Array
-    follows: _Follower | None = None
+    framed: _InFrame | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class _Follower:
+class _InFrame:
     """Conditions on the displacements of a boundary in the frame of a rigid body, for any rotation.
 
     Attributes
@@ -281,7 +281,7 @@ def _conditions(
 ) -> _LinkRows:  # fmt: skip
     number, slave = names.index(link.slave[0]), surfaces[link.slave]
     rows: list[tuple[int, ContactRows]] = []
-    follows: _Follower | None = None
+    framed: _InFrame | None = None
     if link.master is None:
         along_each = _ways(link, slave)
         nodes = np.tile(np.arange(len(slave.nodes)), len(along_each))
@@ -317,7 +317,7 @@ def _conditions(
         rows.append((reference, ContactRows(np.arange(3), -motion)))
         if isinstance(parts[number], LargeDiscretisation) and part.body.turns and not link.master:
             dofs = parts[number].surface(slave).dofs
-            follows = _Follower(number, reference, part.frame, dofs, slave.X, block)
+            framed = _InFrame(number, reference, part.frame, dofs, slave.X, block)
     elif link.master is None and not link.grounded:  # the slave moves as one
         count = len(slave.nodes)
         first = np.arange(len(block)) // count * count
@@ -326,11 +326,11 @@ def _conditions(
         block, areas, X = block[others_], areas[others_], X[:, others_]
     rows.append((number, ContactRows(parts[number].surface(slave).dofs, block)))
     if np.isinf(link.stiffness):
-        return _LinkRows(rows, np.zeros(len(areas)), X, follows)
+        return _LinkRows(rows, np.zeros(len(areas)), X, framed)
     acts = areas > _LITTLE * areas.max()
     rows = [(k, ContactRows(own.dofs, own.block[acts])) for k, own in rows]
-    follows = follows and replace(follows, block=follows.block[acts])
-    return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts], follows)
+    framed = framed and replace(framed, block=framed.block[acts])
+    return _LinkRows(rows, 1 / (link.stiffness * areas[acts]), X[:, acts], framed)
 
 
 def _ways(link: Link, slave: Surface) -> list[Array]:

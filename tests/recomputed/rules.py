@@ -508,7 +508,7 @@ class Rules:
             yield "contact_tangential_force", k, -state.contacts[k].tangential.sum(), exact
         for row, name in enumerate(system.all_names):
             body, number = system.model.body(name), system.part(name)
-            own = -contact[name] - links._resultant(system, state.links, name)[0]
+            own = -contact[name] - links.resultant(system, state, state.links, name)[0]
             if isinstance(body, RigidBody):
                 sizes = (1.0, 1.0, system.parts[number].frame.radius)
                 for axis, motion, u, size in zip(
