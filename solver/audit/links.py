@@ -35,6 +35,8 @@ _HALVINGS = 20
 _BEYOND = 1e-6
 """Distance of a place beyond the end of a piece, over its length: up to it the place belongs to the
 piece."""
+_STILL = 1e-9
+"""Motion of a boundary over the largest one of its body: a smaller one is rounding."""
 _SMALL = 0.1
 """Largest rotation by links [rad]; as a linear displacement it stretches by half its square, 0.5 %.
 """
@@ -146,7 +148,8 @@ def _carried(system: System, link: Link, X: Array, converged: Converged) -> tupl
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:
     """Return the resultant (2,) [N] and the moment [N mm] of a link on a body."""
     own = np.where(system.links.whose == k, converged.state.links, 0.0)
-    moves = _is_large(system, system.model.links[k])
+    link = system.model.links[k]
+    moves = _is_large(system, link) and link.master is None
     return resultant(system, converged.state, own, name, moves=moves)
 
 
@@ -208,6 +211,9 @@ def _misfit(system: System, k: int, converged: Converged) -> float:
         others.append(carried)
     size = max(float(np.abs(each).max()) for each in (u, *others))
     size = max(size, LEAST * _moved_by(system, link.slave[0], converged.state.force_scale))
+    size = max(
+        size, _STILL * float(np.abs(system.displacement(link.slave[0], converged.state)).max())
+    )
     if not size:
         return 0.0
     sprung = np.isfinite(link.stiffness)

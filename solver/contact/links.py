@@ -1,9 +1,10 @@
-"""Links of a model as linear conditions between the unknowns of its parts.
+"""Links of a model as conditions between the unknowns of its parts.
 
 Each condition is ``C u + compliance F = 0`` with a force F of any sign, which acts on the parts by
-``C' F``. A Newton step eliminates the conditions exactly, together with the rigid motions that they
-hold; a contact problem without links remains. It is symmetric unless G differs from A for a body
-that links hold, see `solver.contact.problem`.
+``C' F``. Those of a body of large strain with a rigid body are linear in the frame of this body:
+there C turns, and a shift is added (`Links.at`). A Newton step eliminates the conditions exactly,
+together with the rigid motions that they hold; a contact problem without links remains. It is
+symmetric unless G differs from A for a body that links hold, see `solver.contact.problem`.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ class Links(OnParts):
     compliance : (c,) compliance of springs [mm/N], 0 if the link is rigid
     whose : (c,) number of the link that a condition belongs to
     shift : (c,) violation at the displacements of `at`, less that by ``rows`` [mm]
+    _each, _kept : conditions of each link, and which of all are kept: those independent at rest
     """
 
     rows: tuple[ContactRows | None, ...]
@@ -81,9 +83,14 @@ class Links(OnParts):
         whose = np.repeat(np.arange(len(each)), np.diff(ends))[kept]
         return cls(tuple(map(joined, pieces)), compliance, whose, shift[kept], each, kept)
 
+    @property
+    def turn(self) -> bool:
+        """Whether some of the conditions turn with rigid bodies, and so are not linear."""
+        return any(own.framed is not None for own in self._each)
+
     def at(self, u: Sequence[Array]) -> Links:
-        """Return the conditions at displacements ``u``: some turn with their rigid bodies."""
-        if all(own.framed is None for own in self._each):
+        """Return the conditions at displacements ``u``, at which some have turned."""
+        if not self.turn:
             return self
         return Links.of(self._each, len(self.rows), self._kept, u)
 
@@ -315,7 +322,7 @@ def _conditions(
             X = np.tile(X.mean(axis=1, keepdims=True), len(block))
             areas = np.full(len(block), np.inf)
         rows.append((reference, ContactRows(np.arange(3), -motion)))
-        if isinstance(parts[number], LargeDiscretisation) and part.body.turns and not link.master:
+        if isinstance(parts[number], LargeDiscretisation) and link.master is None:
             dofs = parts[number].surface(slave).dofs
             framed = _InFrame(number, reference, part.frame, dofs, slave.X, block)
     elif link.master is None and not link.grounded:  # the slave moves as one

@@ -32,7 +32,7 @@ def parted(system: System, state: State) -> State:
     the rows of ``E' = [A, -gap]`` and f the last unit vector. If r is zero, there is no such q.
     """
     ends = np.cumsum([part.rigid.shape[1] for part in system.parts])
-    linked = system.linked_motions()
+    linked = system.linked_motions(state.u)
     free = null_space(linked, rcond=_HELD) if len(linked) else np.eye(ends[-1])
     moved, overlap = state, 0.0
     for _ in range(_ROUNDS + 1):

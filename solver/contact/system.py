@@ -145,9 +145,12 @@ class System:
                 allowed = "can move freely: hold it by supports, links or contact"
                 raise ModelError("supports", held, f"body {part.body.name!r} {allowed}")
 
-    def linked_motions(self) -> Array:
-        """Return the violations of links (c, n_rigid) per rigid motion of all parts."""
-        each = zip(self.parts, self.links.rows, strict=True)
+    def linked_motions(self, u: tuple[Array, ...] | None = None) -> Array:
+        """Return the violations of links (c, n_rigid) per rigid motion of all parts.
+
+        They are those before loading, or at displacements ``u``.
+        """
+        each = zip(self.parts, (self.links.at(u) if u else self.links).rows, strict=True)
         return np.hstack([
             np.zeros((len(self.links), part.rigid.shape[1]))
             if rows is None else rows.block @ part.rigid[rows.dofs]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from skfem import Basis
 
+from solver.errors import ModelError
 from solver.fem.deformation import Deformation, PartResponse
 from solver.fem.discretisation import Discretisation
 from solver.fem.log_strain import LogDeformation, RegionDeformation, gradient_operator
@@ -28,6 +29,8 @@ _STEP = 1e-5
 """Step of central differences over the length of an edge."""
 
 
+_LINEAR = 1e-9
+"""Deviation of a force from a linear one, over the force: a larger one is none of rounding."""
 _DISTORTED = 0.2
 """Share of its shape that a distorted element keeps, at most."""
 
@@ -99,16 +102,29 @@ class Follower:
 
 
 class Spinning:
-    """The forces of a load per volume that is linear in the position, as the centrifugal force."""
+    """The forces of a load per volume that is linear in the position, as the centrifugal force.
+
+    Raises
+    ------
+    ModelError
+        for a force that is not linear in the position
+    """
 
     def __init__(self, part: Discretisation, load: Load) -> None:
         self._part, self.load = part, load
-        basis = Basis(part.body.mesh, part.basis.elem, intorder=2 * part.basis.elem.maxdeg)
+        basis = Basis(part.body.mesh, part.basis.elem, intorder=2 * part.basis.elem.maxdeg + 1)
         N = np.array([np.broadcast_to(np.asarray(b[0]), basis.dx.shape) for b in basis.basis])
         volumes = basis.dx * part.measure(np.asarray(basis.global_coordinates()))
-        force = np.asarray(load.body_force(np.stack([np.zeros(2), np.ones(2)], axis=1)))
         mass = np.einsum("aep,bep,ep->eab", N, N, volumes)
-        self._M = np.kron(mass, np.diag(force[:, 1] - force[:, 0]))
+        size = np.ptp(part.X, axis=1).max()
+        at = size * np.array([[0.0, 1.0, 0.0, 2.0], [0.0, 0.0, 1.0, 3.0]])
+        given = np.broadcast_to(np.asarray(load.body_force(at)), at.shape)
+        x, y, both = (given[:, 1:] - given[:, :1]).T
+        if not np.abs(both - 2 * x - 3 * y).max() <= _LINEAR * np.abs(given).max():
+            allowed = "must be linear in the position: it follows a body of large strain"
+            raise ModelError(f"{load.name}.body_force", "not linear", allowed)
+        slope = np.stack([x, y], axis=1) / size
+        self._M = np.kron(mass, slope)
 
     def change(self, u: Array, time: float) -> Array:
         """Return the change of the nodal forces (n,) by the displacements at a time [N]."""
@@ -117,14 +133,19 @@ class Spinning:
         return np.asarray(np.bincount(dofs.ravel(), each.ravel(), self._part.n))
 
     def add_stiffness(self, elements: Array, u: Array, time: float) -> None:
-        """Add its stiffness to the matrices of all elements [N/mm]."""
-        elements -= self.load.factor(time) * self._M
+        """Add the symmetric part of its stiffness to the matrices of all elements [N/mm]."""
+        elements -= self.load.factor(time) / 2 * (self._M + self._M.swapaxes(1, 2))
 
 
 def following(part: Discretisation) -> list[Follower | Spinning]:
     """Return the loads that follow the displacements of a body, were its strain large."""
     loads = [load for load in part.body.every_load if load.follows and not load.moves]
-    spun = [Spinning(part, load) for load in loads if not load.boundaries]
+    nowhere = part.X[:, :0]
+    spun = [
+        Spinning(part, load)
+        for load in loads
+        if not load.boundaries and load.body_force(nowhere) is not None
+    ]
     return [*spun, *(Follower(part, load, of) for load in loads for of in load.boundaries)]
 
 

@@ -73,6 +73,9 @@ _CORRECTIONS, _BALANCED, _CORRECTED, _SLOW, _NEGLIGIBLE = 12, 1e-6, 1e-6, 0.1, (
 the first; size of the last one over that of the first; the forces after a step over those before,
 above which other tangents follow; negligible forces and steps, over the level of forces and the
 displacements: rounding of positions makes steps larger than forces."""
+_STIFF = 0.01
+"""Compliance of a condition of links that turn, over the largest one: one below it turns with it,
+almost along a support, and so is no measure of its violation."""
 _UNBALANCED = 100.0
 _ROUNDED = 10.0
 """Force level of bodies without load, over the level at which rounding errors alone would exceed
@@ -180,10 +183,10 @@ class Increment:
 
         The first step begins where the difference between the starts of the two leads. It suffices
         where no point begins or ceases to flow on the way, and the tangent is exact: it has no
-        terms for surfaces that slide far and turn with the bodies, none for the unsymmetric part of
-        a law, and none at the corners of a yield surface. Else steps follow until forces balance,
-        and on such surfaces until the steps are negligible; if they become so slowly, with the
-        tangents of this increment.
+        terms for surfaces that slide far and turn with the bodies, none for links that turn, none
+        for the unsymmetric part of a law, and none at the corners of a yield surface. Else steps
+        follow until forces balance, and on such surfaces until the steps are negligible; if they
+        become so slowly, with the tangents of this increment.
 
         Parameters
         ----------
@@ -200,7 +203,7 @@ class Increment:
             each = zip(end.state.u, self.start.u, end.start.u, strict=True)
             ahead = replace(end.state, u=tuple(ui + own - its for ui, own, its in each))
             u = self.system.moved(ahead, self.time).u
-            turns = any(contact.finite for contact in self.start.contacts)
+            turns = self.system.links.turn or any(c.finite for c in self.start.contacts)
             self.system = self.system.turned(u)
             responses, candidates = self._respond(u), self._candidates(u, contacts, links)
             residuals, steps, outs = self._residuals(u, responses), list[float](), list[float]()
@@ -286,6 +289,8 @@ class Increment:
                 failure.why = slides or self._flow(responses, residuals, candidates, scale)
                 raise
             out = max(error, tolerances.residual / _LESS) * scale
+            if self.system.links.turn and violation > tolerances.contact:  # they turn first
+                out = np.inf
             before = u
             share, u, responses, residuals = self._search(u, residuals, candidates, step, out)
             crawled = crawled + 1 if share < _SHORT else 0
@@ -425,7 +430,8 @@ class Increment:
             W = candidates.compliance([o.elastic for o in self.system.operators])
             last = np.arange(len(W))[candidates.linked]
             own = W[last, last] + candidates.links.compliance
-            W[last, last] = np.where(own > 0, own, np.diag(W).max(initial=1.0))
+            least = _STIFF * np.diag(W).max(initial=0.0) if self.system.links.turn else 0.0
+            W[last, last] = np.where(own > least, own, np.diag(W).max(initial=1.0))
             self.compliance[key] = W
         return self.compliance[key]
 

@@ -163,6 +163,8 @@ class Body:
         for load in filter(self.turns, self.every_load):
             if not large[self._under(load)].all():
                 allowed = f"must push inside or outside of region {self.large_region!r}, not both"
+                if not load.boundaries:
+                    allowed = f"must be left out, or large_region: it acts on all of {self.name!r}"
                 raise ModelError(load.name, load.boundaries, allowed)
 
     def _check_cracked(self) -> None:

@@ -92,7 +92,7 @@ Side = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Link:
-    """Linear conditions on the displacements of a boundary, the slave.
+    """Conditions on the displacements of a boundary, the slave.
 
     Without ``rigid`` and ``master`` all nodes of the slave have the same displacement; with a
     stiffness, springs hold the slave to the ground instead.
@@ -102,8 +102,8 @@ class Link:
     slave : body and boundary
     master : body and boundary to which the slave is tied; their nodes need not match
     rigid : the rigid body whose motion the slave follows; with a master, the motion of the slave
-        relative to the master, such as the shortening of a bolt. Rotations are small, but of any
-        size if the strain of the slave is large: components and springs then turn with the body
+        relative to the master, such as the shortening of a bolt. Rotations are small. If the strain
+        of the slave is large they may be large, and components and springs turn with the body
     components : components of the displacement in the conditions: along the axes, or along the
         normal or the tangent of the slave at each node. At a corner the normal is the mean of both
         sides

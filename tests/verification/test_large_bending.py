@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from solver import (
     Amplitude,
     Body,
+    Displacement,
     Link,
     Material,
     Model,
@@ -25,8 +26,9 @@ from solver import (
     Stage,
     solve,
 )
+from solver.derivatives.of_models import derive
 from solver.mesh import grid
-from solver.model.loads import Centrifugal, Temperature
+from solver.model.loads import Centrifugal, Load, Pressure, Temperature, Traction
 from tests.verification.test_large_bodies import ELASTIC, block
 
 pytestmark = pytest.mark.solves
@@ -181,6 +183,101 @@ def test_stress_turns_with_a_block_whose_ends_are_turned() -> None:
     assert found.audit("turned").passed
 
 
+@pytest.mark.parametrize("angle", [0.01, 1.0])
+@pytest.mark.parametrize("sides", [{"left": "xy"}, {"left": "x", "bottom": "y"}])
+@pytest.mark.parametrize("more", [{}, {"stiffness": 100.0}, {"distributed": True}])
+def test_a_block_that_links_alone_hold_turns_without_stress(
+    angle: float, sides: dict[str, Any], more: dict[str, Any]
+) -> None:
+    body = block((0, 2), (0, 1), (4, 2))
+    turned = RigidBody(name="hub", centre=(0.0, 0.5), rotation=Moved(value=angle))
+    links = tuple(
+        Link(slave=("b", side), rigid="hub", components=own, **more) for side, own in sides.items()
+    )
+    stages = [Stage(name="turned", target=1.0, steps=4)]
+    found = solve(Model(bodies=(body,), rigid=(turned,), links=links), stages=stages)
+    assert np.abs(found.stress("b", "turned")).max() < 1e-12 * E
+    corner = found.system.full("b").X
+    spin = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    centre = np.array([[0.0], [0.5]])
+    exact = spin @ (corner - centre) + centre - corner
+    assert np.abs(found.displacement("b", "turned") - exact).max() < 1e-9
+    assert found.audit("turned").passed
+
+
+@pytest.mark.parametrize("stiffness", [np.inf, 1e4])
+def test_work_is_balanced_while_a_pressed_block_turns(stiffness: float) -> None:
+    """Turning does no work on it, in 10 increments as in many."""
+    press, turn = Amplitude([0, 1, 2], [0, 1, 1]), Amplitude([0, 1, 2], [0, 0, 1])
+    body = block((0, 2), (0, 1), (4, 2),
+                 loads=(Pressure(boundary="right", value=100.0, amplitude=press),))  # fmt: skip
+    hub = RigidBody(name="hub", centre=(-3.0, 3.0), rotation=Moved(value=1.4, amplitude=turn))
+    link = Link(slave=("b", "left"), rigid="hub", stiffness=stiffness)
+    stages = [
+        Stage(name="pressed", target=1.0, steps=2),
+        Stage(name="turned", target=2.0, steps=10),
+    ]
+    found = solve(Model(bodies=(body,), rigid=(hub,), links=(link,)), stages=stages)
+    assert found.audit("turned").figures["audit_energy"] < 1e-4
+    before, after = (found.stages[stage].energy.external for stage in ("pressed", "turned"))
+    assert after == pytest.approx(before, rel=1e-6)
+
+
+def test_the_moment_on_a_boundary_that_slides_has_the_present_arms() -> None:
+    """Whether the rigid body may rotate or not."""
+    body = block((0, 2), (0, 1), (4, 2), supports={"left": "xy"},
+                 loads=(Traction(boundary="top", y=2e3),))  # fmt: skip
+    link = Link(slave=("b", "right"), rigid="plate", components="x")
+    moments = []
+    for rotation in (0.0, 1e-9):
+        plate = RigidBody(name="plate", centre=(2.0, 0.5), x=Moved(value=0.2),
+                          rotation=Moved(value=rotation))  # fmt: skip
+        found = solve(Model(bodies=(body,), rigid=(plate,), links=(link,)), load=1.0)
+        assert found.audit().passed
+        force, _, moment = found.reaction("plate", "loaded")
+        moments.append(moment)
+    at = np.abs(found.system.full("b").X[0] - 2.0) < 1e-9
+    slid = found.displacement("b", "loaded")[1, at].mean()
+    assert moments[0] == pytest.approx(moments[1], rel=1e-6)
+    assert -moments[0] / force == pytest.approx(slid, abs=0.05)
+    assert slid > 0.09
+
+
+def test_two_blocks_tied_along_one_axis_are_audited() -> None:
+    first = block((0, 2), (0, 1), (4, 2), supports={"left": "xy"})
+    second = block((2, 4), (0, 1), (4, 3), name="c",
+                   loads=(Displacement(boundary="right", x=0.2, y=0.3),))  # fmt: skip
+    tie = Link(slave=("b", "right"), master=("c", "left"), components="x")
+    found = solve(Model(bodies=(first, second), links=(tie,)), load=1.0)
+    assert found.audit().passed
+
+
+def test_derivatives_follow_springs_that_turn() -> None:
+    """Along the path with the same increments, against central differences."""
+    stages = [Stage(name="bent", target=1.0, steps=8)]
+
+    def strip(angle: float, stiffness: float) -> Model:
+        body = block((0, STRIP), (-THIN / 2, THIN / 2), (10, 1), element="quad8",
+                     kinematics="plane_stress", supports={"left": "xy"})  # fmt: skip
+        end = RigidBody(name="end", centre=(STRIP, 0.0), x=Pushed(), y=Pushed(),
+                        rotation=Moved(value=angle))  # fmt: skip
+        link = Link(slave=("b", "right"), rigid="end", stiffness=stiffness)
+        return Model(bodies=(body,), rigid=(end,), links=(link,))
+
+    def end(found: Solution) -> Array:
+        return np.array([*found.motion("end", "bent")[:2], found.reaction("end", "bent")[2]])
+
+    given = {"angle": 2.0, "stiffness": 1e4}
+    slopes = derive(strip, given, end, stages=stages)
+    for name, value in given.items():
+        both = (
+            solve(strip(**given | {name: value * (1 + s)}), stages=stages) for s in (1e-3, -1e-3)
+        )
+        high, low = (end(found) for found in both)
+        exact = (high - low) / (2e-3 * value)
+        assert np.abs(slopes[name] - exact).max() < 1e-4 * np.abs(exact).max()
+
+
 def test_what_cannot_turn_is_refused() -> None:
     body = block((0, 2), (0, 1), (4, 2))
     other = block((2, 4), (0, 1), (4, 2), name="c")
@@ -225,9 +322,35 @@ def test_a_rod_that_spins_is_stretched_by_the_force_at_its_present_places(elemen
     assert not audit.violations
 
 
-def test_a_rotor_spins_wholly_inside_or_outside_the_region() -> None:
+class Swirl(Load):
+    """A user's force that turns about the origin, or that is not linear in the position."""
+
+    follows = True
+
+    def __init__(self, power: int) -> None:
+        object.__setattr__(self, "amplitude", None)
+        object.__setattr__(self, "power", power)
+
+    def body_force(self, x: Array) -> Array:
+        """Return the force per volume (2, n)."""
+        return 5.0 * np.stack([-x[1], x[0] ** self.power])  # type: ignore[attr-defined]
+
+
+def test_a_force_of_a_user_follows_if_it_is_linear() -> None:
+    found = solve(
+        Model(bodies=(block((0, 2), (0, 1), (4, 2), supports={"left": "xy"}, loads=(Swirl(1),)),)),
+        load=1.0, control=PathControl(load_step=0.5),
+    )  # fmt: skip
+    audit = found.audit()
+    assert not audit.violations
+    with pytest.raises(ModelError, match="must be linear in the position: it follows"):
+        solve(Model(bodies=(block((0, 2), (0, 1), (4, 2), supports={"left": "xy"},
+                                  loads=(Swirl(3),)),)), load=1.0)  # fmt: skip
+
+
+def test_a_rotor_spins_as_a_whole() -> None:
     body: dict[str, Any] = {"loads": (Centrifugal(density=1e-8, speed=10.0),),
                             "material": ELASTIC, "element": "quad4", "strain": "large"}  # fmt: skip
     mesh = grid(np.linspace(0, 2, 5), np.linspace(0, 1, 3)).with_subdomains({"near": np.arange(2)})
-    with pytest.raises(ModelError, match="must push inside or outside of region 'near'"):
+    with pytest.raises(ModelError, match="must be left out, or large_region: it acts on all of"):
         Body(name="b", mesh=mesh, large_region="near", **body)
