@@ -167,7 +167,8 @@ class AuditedBody:
         if not law.elastic:
             return law.yield_stress
         u = self._displacement
-        rounded = LEAST * law.elasticity.youngs_modulus * self.plain.steepest * np.abs(u).max()
+        strain = LEAST * self.plain.steepest * np.abs(u).max()
+        rounded = max(strain, _STRAINED * self.plain.body.large) * law.elasticity.youngs_modulus
         return float(max(np.abs(self.stress).max(), rounded))
 
     def law(self) -> tuple[float, float]:
@@ -205,6 +206,8 @@ def misplaced(system: System, bodies: Sequence[PlainBody], states: Iterable[Conv
     return float(np.max(off)) / (float(np.max(most)) or 1.0)
 
 
+_STRAINED = 1e-9
+"""Logarithmic strain of an elastic body at rest: below it its rounding would count as a misfit."""
 _ROUNDED = 1e-5
 """Rounding that is subtracted from nodal forces, over the force level, at most."""
 _LITTLE = 1e-4

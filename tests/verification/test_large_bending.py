@@ -46,7 +46,11 @@ def coiled(rotation: Moved | Pushed, steps: int, link: Link = TILTED) -> Solutio
                   material=Material(youngs_modulus=E, poisson_ratio=0.0))  # fmt: skip
     end = RigidBody(name="end", centre=(STRIP, 0.0), x=Pushed(), y=Pushed(), rotation=rotation)
     model = Model(bodies=(strip,), rigid=(end,), links=(link,))
-    return solve(model, stages=[Stage(name="bent", target=1.0, steps=steps)])
+    bent, released = (
+        Stage(name=name, target=target, steps=steps)
+        for name, target in (("bent", 1.0), ("released", 0.0))
+    )
+    return solve(model, stages=[bent, released])
 
 
 @pytest.mark.parametrize("distributed", [False, True])
@@ -68,6 +72,8 @@ def test_a_strip_is_coiled_into_a_circle(by: str, distributed: bool) -> None:
     assert audit.passed
     assert not audit.outside
     assert audit.figures["audit_links"] < 1e-9
+    assert np.abs(found.displacement("b", "released")).max() < 1e-6 * STRIP
+    assert found.audit("released").passed
 
 
 def test_springs_turn_with_the_body_that_holds_them() -> None:
@@ -203,6 +209,19 @@ def test_a_block_that_links_alone_hold_turns_without_stress(
     exact = spin @ (corner - centre) + centre - corner
     assert np.abs(found.displacement("b", "turned") - exact).max() < 1e-9
     assert found.audit("turned").passed
+
+
+def test_a_block_that_links_alone_hold_is_squeezed_and_bent_in_few_iterations() -> None:
+    body = block((0, 4), (-0.5, 0.5), (10, 4))
+    hubs = (
+        RigidBody(name="left", rotation=Moved(value=-0.2)),
+        RigidBody(name="right", centre=(4.0, 0.0), x=Moved(value=-0.45), rotation=Moved(value=0.2)),
+    )
+    links = tuple(Link(slave=("b", side), rigid=side) for side in ("left", "right"))
+    stages = [Stage(name="bent", target=1.0, steps=10)]
+    found = solve(Model(bodies=(body,), rigid=hubs, links=links), stages=stages)
+    assert sum(found.tally.iterations) < 40
+    assert not found.audit("bent").violations
 
 
 @pytest.mark.parametrize("stiffness", [np.inf, 1e4])
