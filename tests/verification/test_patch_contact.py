@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from solver.errors import WindowTooSmall
 from solver.materials import Elasticity
 from solver.rolling.load import RollingLoad
 from solver.rolling.rail.friction_cone import OPEN, SLIP, STICK
@@ -302,3 +303,5 @@ def test_a_given_ellipse_has_its_resultants() -> None:
     half = load.changed(load=load.load.scaled(0.5))
     assert half.solve(contact.traction).force == pytest.approx(contact.force / 2)
     assert load.load.driven(0.5) == load.load.slipping == load.load
+    with pytest.raises(WindowTooSmall):
+        EllipticPatch(grid=grid, load=RollingLoad(force=1.0), a=1.3, b=2.0)

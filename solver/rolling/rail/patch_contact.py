@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.errors import WindowTooSmall
+from solver.parameters import Length, check
 from solver.rolling.load import AppliedLoad, PassingLoad
 from solver.rolling.rail.flow import PrismState
 from solver.rolling.rail.friction_cone import NORMAL, OPEN, SLIP, TANGENTS
@@ -168,16 +170,24 @@ class EllipticPatch(PatchLoad):
     ----------
     grid : stations and vertices of the surface
     load : its force is the sum of pressure times area, 2 pi a b p0 / 3 [N]
-    a, b : semi-axes along x and z [mm]; the ellipse is within the outermost stations and vertices
+    a, b : semi-axes along x and z [mm]
     centre : z of the centre, which is at x = 0 [mm]
     shear : shear on the surface along x and across, over pressure
     """
 
     grid: PatchGrid
-    a: float
-    b: float
+    a: Length
+    b: Length
     centre: float = 0.0
     shear: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Raise `ModelError` for axes that are not positive, `WindowTooSmall` for a small grid."""
+        check(self)
+        x, z = self.grid.x, self.grid.z
+        beside = max(z[1] - self.centre + self.b, self.centre + self.b - z[-2])
+        if self.a > min(x[0], -x[-1]) - self.grid.spacing / 2 or beside > 0:
+            raise WindowTooSmall("the ellipse reaches the outermost stations or vertices")
 
     def solve(self, u: Array, start: PatchStart | None = None) -> PatchContact:
         """See `PatchLoad`; the tractions depend on neither ``u`` nor ``start``."""
