@@ -168,7 +168,9 @@ class AuditedBody:
             return law.yield_stress
         u = self._displacement
         strain = LEAST * self.plain.steepest * np.abs(u).max()
-        rounded = max(strain, _STRAINED * self.plain.body.large) * law.elasticity.youngs_modulus
+        if self.plain.body.large:
+            strain = max(strain, _STRAINED)
+        rounded = law.elasticity.youngs_modulus * strain
         return float(max(np.abs(self.stress).max(), rounded))
 
     def law(self) -> tuple[float, float]:

@@ -54,7 +54,7 @@ from solver.contact.state import Converged, State
 from solver.contact.system import System
 from solver.fem.deformation import PartResponse
 from solver.fem.discretisation import Discretisation
-from solver.fem.large import following
+from solver.fem.large import Follower, Spinning, following
 from solver.fem.rigid import RigidPart, turning
 from solver.fem.substructure import Substructure
 from solver.linear.schur import Eliminated
@@ -170,6 +170,7 @@ class _Deformed:
         where strain is large
     most : elastic energy of T, also where strain is large, the largest so far [N mm]
     plastic : internal variables
+    loads : loads that would follow the body, made once for all states
     tangent : response with the tangent D; None where the body has its elastic stiffness
     """
 
@@ -210,9 +211,12 @@ class _Deformed:
         turned = _product(R, _matrix(T + change)[:2, :2]) - _matrix(T)[:2, :2]
         turned[:, :, large] = 0.0
         self.force = plain.nominal_forces(turned, change[2]).ravel()
-        for load in following(self.part):
-            if not plain.body.turns(load.load):
-                self.force -= load.change(u, state.time)
+        loads = before.loads if before else following(self.part)
+        self.loads: list[Follower | Spinning] = [
+            load for load in loads if not plain.body.turns(load.load)
+        ]
+        for load in self.loads:
+            self.force -= load.change(u, state.time)
         self.nominal = change.reshape(4, -1)
         change = _mandel(_logarithm(H), np.log(np.maximum(1 + hoop, _FLAT))) - e
         self.strain = np.where(counts, plain.level(change).reshape(4, -1), 0.0)
@@ -306,7 +310,7 @@ def _turned(system: System, state: State) -> Array:
     """
     links, found = system.links, np.zeros(len(system.links))
     for k, link in enumerate(system.model.links):
-        if link.rigid is None or system.full(link.slave[0]).body.large:
+        if link.rigid is None or system.full(link.slave[0]).body.turned_by(link):
             continue
         number, reference = system.part(link.slave[0]), system.part(link.rigid)
         part, rigid, rows = system.parts[number], system.parts[reference], links.rows[number]

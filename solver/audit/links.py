@@ -106,7 +106,7 @@ def least_energy(system: System, force: float) -> float:
 def turned(system: System, converged: Converged) -> tuple[str, ...]:
     """Return messages on rigid bodies that rotate boundaries too far for links."""
     found = []
-    small = (link for link in system.model.links if not _is_large(system, link))
+    small = (link for link in system.model.links if not _turns(system, link))
     for name in dict.fromkeys(link.rigid for link in small if link.rigid):
         angle = abs(_motion(system, name, converged).rotation)
         if not angle <= _SMALL:
@@ -127,9 +127,9 @@ def _motion(system: System, name: str, converged: Converged) -> RigidMotion:
     return _rigid(system, name).motion_of(converged.state.u[system.part(name)])
 
 
-def _is_large(system: System, link: Link) -> bool:
+def _turns(system: System, link: Link) -> bool:
     """Whether a link turns with its rigid body, exactly."""
-    return system.full(link.slave[0]).body.large
+    return system.full(link.slave[0]).body.turned_by(link)
 
 
 def _carried(system: System, link: Link, X: Array, converged: Converged) -> tuple[Array, Array]:
@@ -137,7 +137,7 @@ def _carried(system: System, link: Link, X: Array, converged: Converged) -> tupl
     assert link.rigid is not None
     x, y, angle = _motion(system, link.rigid, converged)
     arm = X - np.reshape(_rigid(system, link.rigid).body.centre, (2, 1))
-    if not _is_large(system, link):
+    if not _turns(system, link):
         return np.array([x - angle * arm[1], y + angle * arm[0]]), np.eye(2)
     turn = np.exp(1j * angle)
     moved = (turn - 1) * (arm[0] + 1j * arm[1]) + (x + 1j * y)
@@ -148,8 +148,7 @@ def _carried(system: System, link: Link, X: Array, converged: Converged) -> tupl
 def _forces(system: System, k: int, converged: Converged, name: str) -> tuple[Array, Array]:
     """Return the resultant (2,) [N] and the moment [N mm] of a link on a body."""
     own = np.where(system.links.whose == k, converged.state.links, 0.0)
-    link = system.model.links[k]
-    moves = _is_large(system, link) and link.master is None
+    moves = _turns(system, system.model.links[k])
     return resultant(system, converged.state, own, name, moves=moves)
 
 

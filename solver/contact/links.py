@@ -21,13 +21,13 @@ from solver.contact.overlap import largest_overlap
 from solver.contact.problem import ContactProblem, ContactRows, ContactSolution, OnParts, joined
 from solver.errors import ModelError
 from solver.fem.discretisation import Discretisation
-from solver.fem.large import LargeDiscretisation
 from solver.fem.loads import comparing
 from solver.fem.nodes import Dofs, vectors
 from solver.fem.part import Part
 from solver.fem.rigid import MovingFrame, RigidPart
 from solver.fem.surface import Surface
 from solver.linear.solvers import Singular
+from solver.model.body import Body
 from solver.model.model import Model
 from solver.model.pairs import Link, Side
 from solver.typing import Array, Bools, Ints
@@ -322,7 +322,8 @@ def _conditions(
             X = np.tile(X.mean(axis=1, keepdims=True), len(block))
             areas = np.full(len(block), np.inf)
         rows.append((reference, ContactRows(np.arange(3), -motion)))
-        if isinstance(parts[number], LargeDiscretisation) and link.master is None:
+        body = parts[number].body
+        if isinstance(body, Body) and body.turned_by(link):
             dofs = parts[number].surface(slave).dofs
             framed = _InFrame(number, reference, part.frame, dofs, slave.X, block)
     elif link.master is None and not link.grounded:  # the slave moves as one

@@ -18,6 +18,7 @@ from solver.mesh.opening import faces_of
 from solver.mesh.rounding import with_zeros
 from solver.model.amplitude import Amplitude
 from solver.model.loads import Displacement, Kinematics, Load, Pressure
+from solver.model.pairs import Link
 from solver.parameters import Thickness, check
 from solver.tensors import AXES
 
@@ -140,6 +141,10 @@ class Body:
     def turns(self, load: Load) -> bool:
         """Whether a load follows the displacements of what it acts on, where strain is large."""
         return self.large and load.follows and bool(self.large_elements[self._under(load)].any())
+
+    def turned_by(self, link: Link) -> bool:
+        """Whether a link of which it is the slave turns with its rigid body, by large angles."""
+        return self.large and link.rigid is not None and link.master is None
 
     def _under(self, load: Load) -> np.ndarray:
         """Return the elements on which a load acts: those at its boundaries, or all."""
