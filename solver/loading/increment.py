@@ -57,6 +57,10 @@ Vectors = tuple[Array, ...]
 
 _BLENDS = (0.0, 1e-3, 0.02, 0.1, 0.3, 1.0)
 """Shares of the elastic stiffness in the tangent, tried in this order."""
+_LEAST, _SLOWLY = 1e-5, 0.5
+"""The share with a tangent that has no stiffness along a step, once two steps have left more of the
+out-of-balance forces than `_SLOWLY`, and until they grow: a larger share slows convergence, and
+with a smaller one rounding determines the step."""
 _SHORT = 0.1
 """Share of a step that the line search takes: a step is short below it. Each short step after the
 first one moves to the next blend, but not to the last one, the elastic stiffness."""
@@ -250,7 +254,7 @@ class Increment:
         responses = self._respond(u)
         residuals = self._residuals(u, responses)
         best, since_best = np.inf, 0
-        series, begun, crawled = Series(), 0.0, 0
+        series, begun, crawled, slow, last = Series(), 0.0, 0, 0, np.inf
         for iteration in range(tolerances.iterations + 1):
             self.system = self.system.turned(u)
             candidates = self._candidates(u, contacts, links)
@@ -281,9 +285,11 @@ class Increment:
             elastic_first = iteration == 0 and self.elastic_first
             first = max(crawled - 1, int(self._softened))
             first = len(_BLENDS) - 1 if elastic_first else min(first, len(_BLENDS) - 2)
+            slow, last = (slow + (error > _SLOWLY * last) if error < last else 0), error
+            blends = (_LEAST,) * (first == 1 and slow > 1) + _BLENDS[first:]
             self._path.append(u)
             try:
-                step = self._step(residuals, responses, candidates, _BLENDS[first:])
+                step = self._step(residuals, responses, candidates, blends)
             except IncrementFailed as failure:
                 slides = self._slide((residuals, candidates))
                 failure.why = slides or self._flow(responses, residuals, candidates, scale)

@@ -138,6 +138,7 @@ def test_the_foot_is_the_whole_base():
     [
         ({"at": 50.0}, "at = 50"),
         ({"at": 30.0, "half_width": 40.0}, "half_width = 40"),
+        ({"half_width": 64.0}, "half_width = 64"),  # one element beside the zone
         ({"depth": 60.0}, "depth = 60"),
     ],
 )

@@ -143,6 +143,8 @@ def _smoothed(X: Array, u: Array, v: Array) -> Array:
     inside = np.zeros((n, m), dtype=bool)
     inside[1:-1, 1:-1] = True
     free = np.flatnonzero(inside)
+    if not free.size:  # a single row of elements
+        return X
     along, across = np.eye(n), np.eye(m)
     (d1, d2), (e1, e2) = _differences(u), _differences(v)
     operators = ((d1, across), (along, e1), (d2, across), (d1, e1), (along, e2))
