@@ -286,10 +286,10 @@ class Increment:
             first = max(crawled - 1, int(self._softened))
             first = len(_BLENDS) - 1 if elastic_first else min(first, len(_BLENDS) - 2)
             slow, last = (slow + (error > _SLOWLY * last) if error < last else 0), error
-            blends = (_LEAST,) * (first == 1 and slow > 1) + _BLENDS[first:]
+            least = (_LEAST,) * (first == 1 and slow > 1)
             self._path.append(u)
             try:
-                step = self._step(residuals, responses, candidates, blends)
+                step = self._step(residuals, responses, candidates, least + _BLENDS[first:])
             except IncrementFailed as failure:
                 slides = self._slide((residuals, candidates))
                 failure.why = slides or self._flow(responses, residuals, candidates, scale)
@@ -297,15 +297,15 @@ class Increment:
             out = max(error, tolerances.residual / _LESS) * scale
             if self.system.links.turn and violation > tolerances.contact:  # they turn first
                 out = np.inf
-            before = u
             share, u, responses, residuals = self._search(u, residuals, candidates, step, out)
             crawled = crawled + 1 if share < _SHORT else 0
             forces = (1 - share) * candidates.forces + share * step.forces
-            ahead = series.sum(before, candidates, step, share)
+            ahead = series.sum(self._path[-1], candidates, step, share)
             if ahead is not None:
                 farther = self._respond(ahead[0])
                 beyond = self._residuals(ahead[0], farther)
                 if _finite(beyond):
+                    best = np.inf if least else best  # it may be far, and leads back from there
                     (u, forces), responses, residuals = ahead, farther, beyond
             contacts = candidates.states(contacts, forces, step.status)
             links = forces[candidates.linked]
