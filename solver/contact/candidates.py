@@ -280,7 +280,7 @@ def no_candidates(system: System, u: tuple[Array, ...], links: Array) -> Candida
         none, lines, off, empty, links, status, empty, rows, turned, covered, covers, gaps,
         slips, np.inf,
         leaving=(None,) * len(none), pushes=pushes, holds=(False,) * len(pushes),
-        links=joins,
+        links=joins, turning=_turning(system, u, rows, (), (), (), (joins, links)),
     )  # fmt: skip
 
 
@@ -387,7 +387,7 @@ def find_candidates(
         pushes=pushes,
         holds=system.holds(start.time, time),
         links=joins,
-        turning=_turning(system, u, acting, pairings, contacts, vertices),
+        turning=_turning(system, u, acting, pairings, contacts, vertices, (joins, links)),
     )
 
 
@@ -398,12 +398,16 @@ def _turning(
     pairings: Sequence[Pairing],
     contacts: Sequence[ContactState],
     vertices: Sequence[Ints],
+    links: tuple[Links, Array],
 ) -> Callable[[], Turning] | None:
     """Return what finds how contact forces turn; None if no body has large strain, or none act."""
-    if not system.model.large or not any(contact.normal.any() for contact in contacts):
+    joins, forces = links
+    if not system.model.large or not (forces.any() or any(c.normal.any() for c in contacts)):
         return None
     each = (system.interfaces, pairings, contacts, vertices, _places(vertices))
-    return lambda: turning_of(system.parts, u, rows, list(zip(*each, strict=True)))
+    return lambda: turning_of(
+        system.parts, u, rows, list(zip(*each, strict=False)), joins.turning(u, forces)
+    )
 
 
 def _below(m: int, rows: ContactRows | None) -> list[ContactRows]:

@@ -3,8 +3,7 @@
 Each condition is ``C u + compliance F = 0`` with a force F of any sign, which acts on the parts by
 ``C' F``. Those of a body of large strain with a rigid body are linear in the frame of this body:
 there C turns, and a shift is added (`Links.at`). A Newton step eliminates the conditions exactly,
-together with the rigid motions that they hold; a contact problem without links remains. It is
-symmetric unless G differs from A for a body that links hold, see `solver.contact.problem`.
+together with the rigid motions that they hold; a contact problem without links remains.
 """
 
 from __future__ import annotations
@@ -115,6 +114,24 @@ class Links(OnParts):
         """Return the energy of the springs [N mm]."""
         return float(self.compliance @ forces**2) / 2
 
+    def turning(self, u: Sequence[Array], forces: Array) -> list[tuple[Ints, Array]]:
+        """Return unknowns (k,) of all parts, derivatives (k, k) of nodal forces by them [N/mm]."""
+        ends, out = np.cumsum([0, *map(len, u)]), []
+        for k, own in enumerate(self._each):
+            if (link := own.framed) is None:
+                continue
+            q, own_u, radius = u[link.reference], u[link.slave], link.frame.radius
+            nodal = self.on_part(link.slave, forces * (self.whose == k), len(own_u))
+            force, place = (vectors(v[link.dofs], 2) for v in (nodal, own_u))
+            arm = link.X + place - (link.frame.centre + q[:2])[:, None]
+            turned = np.stack([-force[1], force[0]]) / radius
+            last = [*turned.T.ravel(), *-turned.sum(axis=1), -(force * arm).sum() / radius**2]
+            K = np.zeros((len(last),) * 2)
+            K[-1] = K[:, -1] = last
+            three = ends[link.reference] + np.arange(3)
+            out.append((np.r_[ends[link.slave] + link.dofs, three], K))
+        return out
+
     def clamped(self, parts: Sequence[Part], time: float) -> tuple[float, float]:
         """Return a force [N] and an energy [N mm] if only the linked nodes moved as prescribed.
 
@@ -133,7 +150,7 @@ class Links(OnParts):
 
 
 def solve_linked(
-    problem: ContactProblem, links: int, touched: Bools, start: Ints
+    problem: ContactProblem, links: Array, touched: Bools, start: Ints
 ) -> ContactSolution | None:
     """Return the solution with links; None if there is none or none was found.
 
@@ -145,7 +162,7 @@ def solve_linked(
     links, touched : see `eliminated`
     start : (n,) see `solve_contact`
     """
-    rest, whole = eliminated(problem, links, touched) if links else (problem, None)
+    rest, whole = eliminated(problem, links, touched) if len(links) else (problem, None)
     found = solve_contact(rest, start)
     if found is None and (problem.turned != problem.A).any():
         return solve_linked(replace(problem, G=None), links, touched, start)
@@ -153,13 +170,14 @@ def solve_linked(
 
 
 def eliminated(
-    problem: ContactProblem, links: int, touched: Bools
+    problem: ContactProblem, links: Array, touched: Bools
 ) -> tuple[ContactProblem, Callable[[ContactSolution], ContactSolution]]:
     """Return the contact problem without links, and a function from its solution to the whole one.
 
     Parameters
     ----------
-    links : number of conditions of links, the last of ``offset``, ``W`` and ``A``
+    links : (c, k) motions of the conditions of links, the last of ``offset`` and ``W``, per rigid
+        motion, were the forces on its body zero
     touched : (k,) whether contact may hold the rigid motion; motions that neither links nor contact
         hold stay zero
 
@@ -168,43 +186,47 @@ def eliminated(
     Singular
         if a tangent has lost its stiffness against the links
     """
-    m = len(problem.offset) - links
-    W, offset, A = problem.W, problem.offset, problem.A
-    size = np.abs(A[m:]).max(initial=0.0) or 1.0
-    _, sizes, ways = linalg.svd(A[m:] / size)
+    m, n = len(problem.offset) - len(links), len(problem.offset)
+    size = np.abs(links).max(initial=0.0) or 1.0
+    _, sizes, ways = linalg.svd(links / size)
     rank = int((sizes > _DEPENDENT).sum())
     held, loose = ways[:rank].T, ways[rank:].T
     _, moved, ways = linalg.svd(loose[touched])
     loose = loose @ ways[: int((moved > _DEPENDENT).sum())].T
     # scale: forces and motions differ in magnitude by the compliance; that of supports is zero
-    held = held * ((np.abs(np.diag(W)[m:]).max(initial=0.0) or 1.0) / size)
-    S = np.zeros((links + rank,) * 2)
-    S[:links, :links] = W[m:, m:]
-    S[:links, links:] = A[m:] @ held
-    S[links:, :links] = S[:links, links:].T
-    by_force = np.vstack([W[m:, :m], (A[:m] @ held).T])
-    alone = np.concatenate([offset[m:], held.T @ problem.balance])
+    held = held * ((np.abs(np.diag(problem.W)[m:]).max(initial=0.0) or 1.0) / size)
+    every = np.hstack([loose, held])
+    D = np.zeros((len(every),) * 2) if problem.D is None else problem.D
+    S = np.block([
+        [problem.W, problem.turned @ every], [(problem.A @ every).T, every.T @ D @ every]
+    ])  # fmt: skip
+    ahead = np.concatenate([problem.offset, every.T @ problem.balance])
+    last = np.zeros(len(S), dtype=bool)
+    last[m:n], last[n + loose.shape[1] :] = True, True
     try:
-        inverse = np.linalg.solve(S, np.column_stack([by_force, alone]))
+        inverse = np.linalg.solve(
+            S[np.ix_(last, last)], np.column_stack([S[np.ix_(last, ~last)], ahead[last]])
+        )
     except np.linalg.LinAlgError as error:  # the linked boundary flows without stiffness
         raise Singular("links cannot hold bodies without stiffness") from error
-    change = by_force.T @ inverse
-    lean = (problem.turned - A)[:m] @ held @ inverse[links:]
+    left = np.column_stack([S[np.ix_(~last, ~last)], ahead[~last]])
+    left -= S[np.ix_(~last, last)] @ inverse
     rest = replace(
         problem,
-        W=W[:m, :m] - (change[:, :m] + change[:, :m].T) / 2 - lean[:, :m],
-        offset=offset[:m] - change[:, m] - lean[:, m],
-        A=A[:m] @ loose,
-        G=problem.turned[:m] @ loose,
-        balance=loose.T @ problem.balance,
+        W=left[:m, :m],
+        offset=left[:m, -1],
+        A=left[m:, :m].T,
+        G=None if problem.G is None else left[:m, m:-1],
+        balance=left[m:, -1],
+        D=None if problem.D is None else left[m:, m:-1],
     )
 
     def whole(found: ContactSolution) -> ContactSolution:
-        own = -(inverse[:, :m] @ found.forces + inverse[:, m])
+        own = -(inverse @ np.concatenate([found.forces, found.rigid, [1.0]]))
         return replace(
             found,
-            forces=np.concatenate([found.forces, own[:links]]),
-            rigid=held @ own[links:] + loose @ found.rigid,
+            forces=np.concatenate([found.forces, own[: n - m]]),
+            rigid=held @ own[n - m :] + loose @ found.rigid,
         )
 
     return rest, whole

@@ -34,7 +34,7 @@ class ContactProblem:
     Attributes
     ----------
     W : (m, m) compliance of the contact points [mm/N], m = 2n with friction, n without; symmetric
-        unless links hold a body whose G differs from A, or contact forces turn with surfaces
+        unless links hold a body whose G differs from A, or forces turn with surfaces or frames
     offset : (m,) gap and slip at zero force [mm]
     lines : friction bound at each point, the least of lines of tangential over normal force [N]
     A : (m, k) motion of the points along the forces, per free rigid motion

@@ -4,8 +4,8 @@ At a point of the slave, the forces N and T of contact push with ``p = N n + T t
 and with -p on the slave; n is the normal of the slave, or that of the master reversed. If it turns
 by theta, p changes by ``(T n - N t) theta``; if the point that it meets moves by d eta along the
 edge of the master, the shape functions of the master change. Both are linear in the displacements
-of the surfaces. Without them Newton's method converges like a geometric series, the slower the
-larger the forces are.
+of the surfaces. Forces of links turn with rigid bodies (`Links.turning`). Without these changes
+Newton's method converges like a geometric series, the slower the larger the forces are.
 """
 
 from __future__ import annotations
@@ -43,16 +43,13 @@ class Turning:
     rows: Array
     motions: Array
 
-    def split(self, values: Array) -> list[Array]:
-        """Return the values (k, ...) of each part."""
-        return np.split(values, np.cumsum([len(own) for own in self.dofs])[:-1])
-
 
 def turning_of(
     parts: Sequence[Part],
     u: Sequence[Array],
     rows: Sequence[ContactRows | None],
     pairs: Sequence[tuple[Interface, Pairing, ContactState, Ints, slice]],
+    links: list[tuple[Ints, Array]],
 ) -> Turning:
     """Return how contact turns at displacements ``u``.
 
@@ -60,11 +57,12 @@ def turning_of(
     ----------
     rows : for each part, the derivatives of all conditions as the forces act
     pairs : interface, pairing, forces, candidates, and the places of their gaps in the conditions
+    links : how forces of links turn, see `Links.turning`
     """
-    m, n = max(len(own.block) for own in rows if own), max(place.stop for *_, place in pairs)
+    m, n = max(len(own.block) for own in rows if own), max([p.stop for *_, p in pairs], default=0)
     ends = np.cumsum([0, *(part.n for part in parts)])
     acting = [(ends[k] + own.dofs, own.block) for k, own in enumerate(rows) if own]
-    closing, changes = [], []
+    closing, changes = [], links
     for interface, pairing, contact, at, place in pairs:
         for side, (number, part, surface) in enumerate(interface.sides):
             gaps = np.zeros((n, surface.X.size))

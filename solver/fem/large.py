@@ -16,7 +16,7 @@ from skfem import Basis
 
 from solver.errors import ModelError
 from solver.fem.deformation import Deformation, PartResponse
-from solver.fem.discretisation import Discretisation
+from solver.fem.discretisation import Discretisation, choose_pins
 from solver.fem.log_strain import LogDeformation, RegionDeformation, gradient_operator
 from solver.fem.nodes import Dofs, vectors
 from solver.fem.surface import edges_of
@@ -31,6 +31,8 @@ _STEP = 1e-5
 
 _LINEAR = 1e-9
 """Deviation of a force from a linear one, over the force: a larger one is none of rounding."""
+_STIFF = 1e3
+"""Stiffness of the springs that hold rigid motions, over the mean of the diagonal."""
 _DISTORTED = 0.2
 """Share of its shape that a distorted element keeps, at most."""
 
@@ -152,6 +154,8 @@ def following(part: Discretisation) -> list[Follower | Spinning]:
 class LargeDiscretisation(Discretisation):
     """Unknowns, quadrature and operators of a body of large strain."""
 
+    _whirls: bool
+    """Whether it can turn as a whole."""
     _unit: float
     """Angle [rad] of the last of its rigid motions, if it is a rotation."""
 
@@ -177,6 +181,30 @@ class LargeDiscretisation(Discretisation):
         """See `Part`."""
         return not (self._following or self.body.large_elements.all())
 
+    def _hold(self) -> None:
+        super()._hold()
+        self._whirls = self.rigid.shape[1] == 3 and bool(self.body.large_elements.all())
+        if self._whirls:
+            self.active = self.free
+
+    def _springs(self, x: Array) -> Array:
+        """Return the values on `pattern` of springs that hold a body that turns, nodes at x (2, n).
+
+        They are where pins would hold its rigid motions there: pins before loading hold no rotation
+        about them after a quarter turn. A Newton step strains none (`solver.loading.step`).
+        """
+        data = np.zeros(self.pattern.nnz)
+        if self._whirls and np.isfinite(x).all():
+            pins = np.setdiff1d(self.free, choose_pins(self._motions(x), self.free))
+            at = self.pattern.indptr[np.searchsorted(self.free, pins)]
+            data[at] = _STIFF * self.diagonal.mean()
+        return data
+
+    @cached_property
+    def elastic_data(self) -> Array:
+        """See `Discretisation`; with the springs of a body that turns."""
+        return self._assembly.values(slice(None), self.elastic_elements) + self._springs(self.X)
+
     def external(self, time: float, u: Array | None = None) -> Array:
         """Return the external nodal forces (n,) at a time and displacements (n,) [N]."""
         force = super().external(time)
@@ -187,7 +215,8 @@ class LargeDiscretisation(Discretisation):
 
     def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
         """See `Discretisation`; the stiffness of pressures that follow is whole, too."""
-        data = super().tangent_data(response, blend)
+        x = self.X + vectors(response.place[0], 2)
+        data = super().tangent_data(response, blend) + self._springs(x) - self._springs(self.X)
         if not self._following:
             return data
         K = np.zeros_like(self.elastic_elements)
@@ -218,23 +247,21 @@ class LargeDiscretisation(Discretisation):
         """Return the body at displacements u: its rotation is about its place.
 
         Forces within a body have no moment about its place, but one about its place before loading,
-        which contact would have to hold. Unknowns and pins stay the same. The free motions of a
-        body that is held somewhere are those before loading: supports fix points of it, about which
-        it cannot be said to turn.
+        which contact would have to hold. The free motions of a body that is held somewhere are
+        those before loading: supports fix points of it, about which it cannot be said to turn.
         """
-        part = not self.body.large_elements.all()  # the rest of the body cannot turn
-        if part or self._held.any() or self.rigid.shape[1] < 2 or not np.isfinite(u).all():
+        if not self._whirls or not np.isfinite(u).all():
             return self
         here, x = copy(self), self.X + vectors(u, self.dim)
         here.rigid = self._motions(x)
         here._unit = np.ptp(vectors(here.rigid[:, -1], 2)[0]) / np.ptp(x[1])
         return here
 
-    def turned_forces(self, time: float, contact: Array) -> Array | None:
+    def turned_forces(self, time: float, residual: Array) -> Array | None:
         """See `Part`: forces within the body turn with it, and so do loads that follow it."""
-        if self.rigid.shape[1] < 3 or not self.body.large_elements.all():
+        if not self._whirls:
             return None
-        forces = self.external(time) + contact
+        forces = self.external(time) - residual
         for each in self._following:
             if isinstance(each, Follower):
                 forces -= each.nodal(each.before, time)

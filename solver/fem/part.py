@@ -98,11 +98,11 @@ class Part(ABC):
         """Return the part with its rigid motions at unknowns u (n,)."""
         return self
 
-    def turned_forces(self, time: float, contact: Array) -> Array | None:
+    def turned_forces(self, time: float, residual: Array) -> Array | None:
         """Return the stiffness times the rigid motions (n, n_rigid) [N/mm], or None.
 
         None where it is zero, or left out: for bodies that can move in one or two ways only.
-        ``contact`` (n,) are the contact forces, which balance forces within the part and loads.
+        ``residual`` (n,) are external minus internal forces, without contact forces.
         """
         return None
 

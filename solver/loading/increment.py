@@ -187,10 +187,10 @@ class Increment:
 
         The first step begins where the difference between the starts of the two leads. It suffices
         where no point begins or ceases to flow on the way, and the tangent is exact: it has no
-        terms for surfaces that slide far and turn with the bodies, none for links that turn, none
-        for the unsymmetric part of a law, and none at the corners of a yield surface. Else steps
-        follow until forces balance, and on such surfaces until the steps are negligible; if they
-        become so slowly, with the tangents of this increment.
+        terms for surfaces of small strain that slide far, none for the unsymmetric part of a law,
+        and none at the corners of a yield surface. Else steps follow until forces balance, and if
+        surfaces slide far or links turn until the steps are negligible; if they become so slowly,
+        with the tangents of this increment.
 
         Parameters
         ----------
@@ -295,8 +295,6 @@ class Increment:
                 failure.why = slides or self._flow(responses, residuals, candidates, scale)
                 raise
             out = max(error, tolerances.residual / _LESS) * scale
-            if self.system.links.turn and violation > tolerances.contact:  # they turn first
-                out = np.inf
             share, u, responses, residuals = self._search(u, residuals, candidates, step, out)
             crawled = crawled + 1 if share < _SHORT else 0
             forces = (1 - share) * candidates.forces + share * step.forces

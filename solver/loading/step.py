@@ -1,6 +1,6 @@
 """One Newton step of all parts, condensed to the contact points and solved there; its acceleration.
 
-Where contact forces turn with surfaces and bodies (`turned_problem`), a step has, with the
+Where contact forces turn with surfaces and bodies (`Turning`), a step has, with the
 stiffness K of the parts, their rigid motions R, and the unknowns of contact c,
 
     u = K^-1 (r + H' F - T u_c) + (R - Z) q,   Z = K^-1 (K R),   u_c = M (a + C H' F + (R - Z) q)
@@ -8,7 +8,8 @@ stiffness K of the parts, their rigid motions R, and the unknowns of contact c,
 where T is the stiffness of the turning forces (`solver.contact.turning`), C the compliance of the
 unknowns c, ``M = (1 + C T)^-1``, and a the displacements by r alone. K R is not zero under load:
 the forces within a body turn with it. The resultants of all forces on the rigid motions must
-vanish.
+vanish. The stiffness has pins or springs where they hold these motions; as the resultants vanish,
+these bear no force, and a step does not depend on where they are.
 
 The tangent lacks derivatives of the friction bound along a surface, with small strain also those
 of contact normals, and may be blended with the elastic stiffness. Newton's method then converges
@@ -30,7 +31,7 @@ from scipy.linalg import block_diag
 
 from solver.contact.candidates import Candidates
 from solver.contact.links import solve_linked
-from solver.contact.problem import ContactProblem, ContactSolution
+from solver.contact.problem import ContactProblem
 from solver.contact.system import System
 from solver.contact.turning import Turning
 from solver.fem.operators import Operator
@@ -110,67 +111,41 @@ def newton_step(
     begun = [operator.begin(r) for operator, r in zip(operators, balanced, strict=True)]
     each = zip(system.parts, candidates.stays, strict=True)
     floating = [part.rigid[:, :0] if stays else part.rigid for part, stays in each]
-    pushed = [r + p for r, p in zip(residuals, candidates.pushes, strict=True)]
     touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
-
-    def solved(problem: ContactProblem) -> ContactSolution | None:
-        links, last = len(candidates.links), np.arange(len(problem.W))[candidates.linked]
-        problem.W[last, last] += candidates.links.compliance
-        problem.offset[last] -= candidates.links.compliance * candidates.forces[last]
-        return solve_linked(problem, links, touched, candidates.status)
-
-    solution = None
-    if candidates.turning is not None and not len(candidates.links):
-        forces = on_parts(system, candidates, candidates.forces)
-        rigid = [
-            (R, part.turned_forces(time, own) if R.size else None)
-            for part, R, own in zip(system.parts, floating, forces, strict=True)
-        ]
-        problem, moved = turned_problem(
-            candidates, candidates.turning(), operators, begun, rigid, pushed
-        )
-        solution = solved(problem)
-    if solution is None:  # the forces that turn are those of contacts that may open
-        problem, moved = _plain_problem(system, candidates, operators, begun, floating, pushed)
-        solution = solved(problem)
+    A = np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)])
+    turning = candidates.turning() if candidates.turning else None
+    free, own, balance = [], [], []
+    for part, R, operator, r, push in zip(
+        system.parts, floating, operators, residuals, candidates.pushes, strict=True
+    ):
+        motion, D = R, np.zeros((R.shape[1],) * 2)
+        if turning and R.size and (KR := part.turned_forces(time, r)) is not None:
+            still = np.zeros(len(R))
+            Z = np.stack([operator.begin(each).finish(still) for each in KR.T], axis=1)
+            motion, D = R - Z, KR.T @ Z - R.T @ KR
+        free.append(motion)
+        own.append(D)
+        balance.append(motion.T @ (r + push))
+    given = candidates, operators, begun, free, np.concatenate(balance)
+    if turning is None:
+        problem, pushes = _problem(*given)
+    else:
+        problem, pushes = _turned_problem(*given, block_diag(*own), turning)
+    last = np.arange(len(problem.W))[candidates.linked]
+    problem.W[last, last] += candidates.links.compliance
+    problem.offset[last] -= candidates.links.compliance * candidates.forces[last]
+    solution = solve_linked(problem, A[last], touched, candidates.status)
     if solution is None:
         return None
-    u = moved(solution.forces, solution.rigid)
+    motions = np.split(solution.rigid, np.cumsum([R.shape[1] for R in free])[:-1])
+    changes = pushes(solution.forces, solution.rigid)
+    u = tuple(
+        part.finish(push) + R @ q
+        for part, push, R, q in zip(begun, changes, free, motions, strict=True)
+    )
     if not all(np.isfinite(du).all() for du in u):
         return None
     return NewtonStep(u, solution.forces, solution.status, solution.pivoted)
-
-
-def _plain_problem(
-    system: System,
-    candidates: Candidates,
-    operators: Sequence[Operator],
-    begun: Sequence[Begun],
-    floating: Sequence[Array],
-    residuals: Sequence[Array],
-) -> tuple[ContactProblem, Callable[[Array, Array], Vectors]]:
-    """Return the contact problem, and a function of its forces and motions to displacements."""
-    W = candidates.compliance(operators)
-    motion = candidates.motion - W @ candidates.forces
-    for i, part in enumerate(begun):
-        motion += candidates.of_part(i, part.kept)
-    problem = ContactProblem(
-        W=W,
-        offset=motion,
-        lines=candidates.lines,
-        A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)]),
-        G=np.hstack([candidates.motions(i, R) for i, R in enumerate(floating)]),
-        balance=np.concatenate([R.T @ r for R, r in zip(floating, residuals, strict=True)]),
-    )
-
-    def moved(forces: Array, q: Array) -> Vectors:
-        more = forces - candidates.forces
-        change = [candidates.on_part(i, more, part.n) for i, part in enumerate(system.parts)]
-        rigid = np.split(q, np.cumsum([R.shape[1] for R in floating])[:-1])
-        each = zip(begun, change, floating, rigid, strict=True)
-        return tuple(part.finish(c) + R @ own for part, c, R, own in each)
-
-    return problem, moved
 
 
 def norm(vectors: Sequence[Array]) -> float:
@@ -236,68 +211,74 @@ def search(slope: Callable[[float], float], start: float, end: float) -> float:
     return share
 
 
-def turned_problem(
+def _problem(
     candidates: Candidates,
-    turning: Turning,
     operators: Sequence[Operator],
     begun: Sequence[Begun],
-    rigid: Sequence[tuple[Array, Array | None]],
-    residuals: Sequence[Array],
-) -> tuple[ContactProblem, Callable[[Array, Array], Vectors]]:
-    """Return the problem, and a function of its forces and rigid motions to displacements.
+    rigid: Sequence[Array],
+    balance: Array,
+) -> tuple[ContactProblem, Callable[[Array, Array], list[Array]]]:
+    """Return the contact problem, and its forces and motions to changes of nodal forces.
 
-    Parameters
-    ----------
-    begun : displacements of each part by its out-of-balance forces
-    rigid : for each part, R and K R, None where that is zero
-    residuals : external minus internal forces of each part, without contact forces [N]
+    ``begun`` are displacements of parts by their out-of-balance forces, ``rigid`` their motions.
     """
-    H, T, forces = turning.rows, turning.stiffness, candidates.forces
-    free, own, resultants = [], [], []
-    for (R, KR), operator, r in zip(rigid, operators, residuals, strict=True):
-        motion, D = R, np.zeros((R.shape[1],) * 2)
-        if KR is not None:
-            still = np.zeros(len(R))
-            Z = np.stack([operator.begin(each).finish(still) for each in KR.T], axis=1)
-            motion, D = R - Z, KR.T @ Z - R.T @ KR
-        free.append(motion)
-        own.append(D)
-        resultants.append(motion.T @ r)
+    W, F = candidates.compliance(operators), candidates.forces
+    offset = candidates.motion - W @ F
+    for i, part in enumerate(begun):
+        offset += candidates.of_part(i, part.kept)
+    problem = ContactProblem(
+        W=W,
+        offset=offset,
+        lines=candidates.lines,
+        A=np.hstack([candidates.of_part(i, R) for i, R in enumerate(rigid)]),
+        G=np.hstack([candidates.motions(i, R) for i, R in enumerate(rigid)]),
+        balance=balance,
+    )
+    return problem, lambda forces, q: [
+        candidates.on_part(i, forces - F, len(R)) for i, R in enumerate(rigid)
+    ]
+
+
+def _turned_problem(
+    candidates: Candidates,
+    operators: Sequence[Operator],
+    begun: Sequence[Begun],
+    rigid: Sequence[Array],
+    balance: Array,
+    D: Array,
+    turning: Turning,
+) -> tuple[ContactProblem, Callable[[Array, Array], list[Array]]]:
+    """Return the problem if contact forces turn; ``rigid`` are R - Z, and D their resultants."""
+    H, T, F = turning.rows, turning.stiffness, candidates.forces
+    ends = np.cumsum([len(at) for at in turning.dofs])
     each = zip(operators, turning.dofs, strict=True)
     C = block_diag(*(operator.compliance(at, np.eye(len(at))) for operator, at in each))
     a = np.concatenate([part.kept[at] for part, at in zip(begun, turning.dofs, strict=True)])
-    R = block_diag(*(of[at] for of, at in zip(free, turning.dofs, strict=True)))
+    R = block_diag(*(of[at] for of, at in zip(rigid, turning.dofs, strict=True)))
     try:
         M = np.linalg.inv(np.eye(len(T)) + C @ T)
     except np.linalg.LinAlgError as error:
         raise Singular("contact forces turn surfaces that do not resist") from error
     by_motion, TM = turning.motions @ M, T @ M
     W = by_motion @ C @ H.T
-    kept = H - H @ (TM @ C).T
     problem = ContactProblem(
         W=W,
-        offset=candidates.motion + by_motion @ a - W @ forces,
+        offset=candidates.motion + by_motion @ a - W @ F,
         lines=candidates.lines,
-        A=kept @ R,
+        A=(H - H @ (TM @ C).T) @ R,
         G=by_motion @ R,
-        balance=np.concatenate(resultants) - R.T @ (TM @ (a - C @ (H.T @ forces))),
-        D=block_diag(*own) - R.T @ TM @ R,
+        balance=balance - R.T @ (TM @ (a - C @ (H.T @ F))),
+        D=D - R.T @ TM @ R,
     )
 
-    def moved(forces: Array, q: Array) -> Vectors:
-        more = H.T @ (forces - candidates.forces)
-        change = turning.split(more - TM @ (a + C @ more + R @ q))
-        motions = np.split(q, np.cumsum([of.shape[1] for of in free])[:-1])
-        out = []
-        for part, of, at, pushed, motion in zip(
-            begun, free, turning.dofs, change, motions, strict=True
-        ):
-            nodal = np.zeros(len(of))
-            nodal[at] = pushed
-            out.append(part.finish(nodal) + of @ motion)
-        return tuple(out)
+    def pushes(forces: Array, q: Array) -> list[Array]:
+        more, nodal = H.T @ (forces - F), [np.zeros(len(of)) for of in rigid]
+        change = more - TM @ (a + C @ more + R @ q)
+        for of, at, end in zip(nodal, turning.dofs, ends, strict=True):
+            of[at] = change[end - len(at) : end]
+        return nodal
 
-    return problem, moved
+    return problem, pushes
 
 
 _SLOW = 0.6

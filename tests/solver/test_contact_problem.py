@@ -382,7 +382,8 @@ def test_a_round_body_without_friction_is_pressed_though_nothing_resists_its_tur
         balance=np.array([-1.0, 0.0]),
         G=np.array([[1.0, -0.1], [1.0, 0.1]]),
     )
-    found = solve_linked(problem, 0, np.ones(2, dtype=bool), np.array([STICK, STICK]))
+    touched = np.ones(2, dtype=bool)
+    found = solve_linked(problem, np.zeros((0, 2)), touched, np.array([STICK, STICK]))
     assert found is not None
     assert natural_residual(problem, found) < 1e-8
 
@@ -393,7 +394,7 @@ def test_a_load_that_nothing_bears_is_tried_again_only_if_normals_lean(monkeypat
     pulled = replace(problem, balance=-problem.balance, G=problem.A + lean * np.eye(24, 2))
     tried = []
     monkeypatch.setattr(complementarity, "_lag_bound", tried.append)
-    assert solve_linked(pulled, 0, np.ones(2, dtype=bool), np.full(12, OPEN)) is None
+    assert solve_linked(pulled, np.zeros((0, 2)), np.ones(2, dtype=bool), np.full(12, OPEN)) is None
     assert len(tried) == times
 
 

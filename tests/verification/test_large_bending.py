@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scipy.optimize import brentq
 from solver import (
     Amplitude,
     Body,
+    ContactPair,
     Displacement,
     Link,
     Material,
@@ -27,8 +29,10 @@ from solver import (
     solve,
 )
 from solver.derivatives.of_models import derive
+from solver.fem.discretisation import choose_pins
 from solver.mesh import grid
 from solver.model.loads import Centrifugal, Load, Pressure, Temperature, Traction
+from solver.model.rigid import line
 from tests.verification.test_large_bodies import ELASTIC, block
 
 pytestmark = pytest.mark.solves
@@ -222,6 +226,100 @@ def test_a_block_that_links_alone_hold_is_squeezed_and_bent_in_few_iterations() 
     found = solve(Model(bodies=(body,), rigid=hubs, links=links), stages=stages)
     assert sum(found.tally.iterations) < 40
     assert not found.audit("bent").violations
+
+
+PRESS, TURN = Amplitude([0, 1, 2], [0, 1, 1]), Amplitude([1, 2], [0, 1])
+
+
+def squeezed(down: float, angle: float, held: str, **more: Any) -> Model:
+    """Return a block squeezed by two rigid bodies that turn about one centre.
+
+    Links or contact alone hold it.
+    """
+    body = block((-0.5, 0.5), (0, 1), (3, 3), **more)
+    turned = {"rotation": Moved(value=angle, amplitude=TURN)}
+    top = RigidBody(name="top", centre=(0.0, down), surfaces={"face": line((-3, 1), (3, 1))},
+                    y=Moved(value=-down, amplitude=PRESS), **turned)  # fmt: skip
+    bottom = RigidBody(name="bottom", surfaces={"face": line((3, 0), (-3, 0))}, **turned)
+    sides: Any = [(("b", side), side) for side in ("top", "bottom")]
+    fields: dict[str, Any] = {"links": tuple(Link(slave=s, rigid=to) for s, to in sides)}
+    if held == "contact":
+        fields = {"contacts": tuple(ContactPair(slave=s, master=(to, "face"), friction=1.0)
+                                    for s, to in sides)}  # fmt: skip
+    return Model(bodies=(body,), rigid=(top, bottom), **fields)
+
+
+ROUND = (Stage(name="squeezed", target=1.0, steps=5), Stage(name="turned", target=2.0, steps=20))
+
+
+@pytest.mark.parametrize("held", ["links", "contact"])
+@pytest.mark.parametrize("angle", [2 * np.pi, -4.0])
+def test_a_squeezed_block_turns_once_around_as_it_turns_a_little(held: str, angle: float) -> None:
+    """Its stress turns with it; the last increments take no more iterations than the first ones."""
+    found = solve(squeezed(0.1, angle, held), stages=ROUND)
+    before, after = (found.stress("b", stage.name) for stage in ROUND)
+    c, s = np.cos(angle), np.sin(angle)
+    R, plane = np.array([[c, -s], [s, c]]), np.array([[before[0], before[3]], before[[3, 1]]])
+    turned = np.einsum("ik,kl...,jl->ij...", R, plane, R)
+    assert np.abs(before).max() > 0.05 * E
+    assert np.abs(turned[[0, 1, 0], [0, 1, 1]] - after[[0, 1, 3]]).max() < 1e-7 * E
+    assert max(found.tally.iterations) <= 4
+    assert max(found.tally.iterations[-20:]) <= 3
+    assert found.audit("turned").passed
+
+
+@pytest.mark.parametrize("held", ["links", "contact"])
+def test_pins_elsewhere_give_the_same_steps(held: str) -> None:
+    """Springs that hold its rigid motions while a step is solved strain in none."""
+    model = squeezed(0.1, 2.0, held)
+    stages = (*ROUND[:1], Stage(name="turned", target=2.0, steps=6))
+    first = solve(model, stages=stages)
+
+    def late(rigid: Array, free: Any) -> Any:
+        cut = len(free) // 2
+        return np.union1d(free[:cut], choose_pins(rigid, free[cut:]))
+
+    with mock.patch("solver.fem.large.choose_pins", late):
+        second = solve(model, stages=stages)
+    assert first.tally.iterations == second.tally.iterations
+    one, two = (found.displacement("b", "turned") for found in (first, second))
+    assert np.abs(one - two).max() < 1e-9
+    assert (one != two).any()
+
+
+@pytest.mark.parametrize("held", ["links", "contact"])
+def test_derivatives_of_a_turned_block_are_those_of_differences(held: str) -> None:
+    given = {"down": 0.15, "angle": 4.0}
+    stages = (*ROUND[:1], Stage(name="turned", target=2.0, steps=12))
+
+    def forces(found: Solution) -> Array:
+        return np.array(found.reaction("top", "turned")[:2])
+
+    slopes = derive(lambda **at: squeezed(held=held, **at), given, forces, stages=stages)
+    for name, value in given.items():
+        high, low = (
+            forces(solve(squeezed(**given | {name: value * (1 + step)}, held=held), stages=stages))
+            for step in (3e-4, -3e-4)
+        )
+        exact = (high - low) / (6e-4 * value)
+        assert np.abs(slopes[name] - exact).max() < 1e-5 * np.abs(exact).max()
+
+
+def test_a_block_pulled_at_a_free_rigid_body_converges_quadratically() -> None:
+    """Forces of links turn with the frame, and those within the block with the block."""
+    body = block((0, 2), (0, 1), (8, 4))
+    held = RigidBody(name="held", centre=(0.0, 0.5), rotation=Moved(value=1.0, amplitude=TURN))
+    pulled = RigidBody(name="pulled", centre=(2.0, 0.5), x=Pushed(value=2e4, amplitude=PRESS),
+                       y=Pushed(value=7e3), rotation=Pushed(value=4e3))  # fmt: skip
+    links = tuple(
+        Link(slave=("b", side), rigid=to) for side, to in (("left", "held"), ("right", "pulled"))
+    )
+    stages = [Stage(name="pulled", target=1.0, steps=4), Stage(name="turned", target=2.0, steps=8)]
+    found = solve(Model(bodies=(body,), rigid=(held, pulled), links=links), stages=stages)
+    assert max(found.tally.iterations) <= 5
+    assert sum(found.tally.iterations) <= 55
+    assert found.motion("pulled", "turned").rotation > 1.0
+    assert found.audit("turned").passed
 
 
 @pytest.mark.parametrize("stiffness", [np.inf, 1e4])

@@ -207,28 +207,31 @@ def test_a_squeezed_element_is_reported_with_its_place(down: float, messages: in
     assert all("(0.5, 0.5) keeps 9% of its shape: make" in text for text in warnings)
 
 
-def test_a_pressed_block_that_plates_turn_keeps_its_stress() -> None:
-    """Objectivity through the solver: both plates turn by 1 rad about one centre, in contact."""
+@pytest.mark.parametrize(("angle", "steps"), [(1.0, 8), (2 * np.pi, 50)])
+def test_a_pressed_block_that_plates_turn_keeps_its_stress(angle: float, steps: int) -> None:
+    """Objectivity through the solver: both plates turn about one centre, in contact."""
     press, turn = Amplitude([0, 1, 2], [0, 1, 1]), Amplitude([1, 2], [0, 1])
     hardens = Material(youngs_modulus=E, poisson_ratio=0.3, yield_stress=400.0,
                        hardening_ratio=0.02, isotropic_fraction=0.5)  # fmt: skip
     pressed = block((-0.5, 0.5), (0.0, 1.0), (3, 3), name="block", material=hardens)
     plates = (
         RigidBody(name="top", surfaces={"face": line((-3.0, 1.0), (3.0, 1.0))}, centre=(0.0, 0.2),
-                  y=Moved(value=-0.2, amplitude=press), rotation=Moved(value=1.0, amplitude=turn)),
+                  y=Moved(value=-0.2, amplitude=press),
+                  rotation=Moved(value=angle, amplitude=turn)),
         RigidBody(name="bottom", surfaces={"face": line((3.0, 0.0), (-3.0, 0.0))},
-                  rotation=Moved(value=1.0, amplitude=turn)),
+                  rotation=Moved(value=angle, amplitude=turn)),
     )  # fmt: skip
     model = Model(bodies=(pressed,), rigid=plates, contacts=tuple(
         ContactPair(slave=("block", side), master=(side, "face"), friction=1.0)
         for side in ("top", "bottom")
     ))  # fmt: skip
-    stages = (Stage(name="pressed", target=1.0, steps=8), Stage(name="turned", target=2.0, steps=8))
+    stages = (Stage(name="pressed", target=1.0, steps=8),
+              Stage(name="turned", target=2.0, steps=steps))  # fmt: skip
     fine = PathControl(tolerances=Tolerances(residual=1e-13, contact=1e-12))
     found = solve(model, stages=stages, control=fine)
     assert found.audit("turned").passed
     before, after = (found.stress("block", stage) for stage in ("pressed", "turned"))
-    c, s = np.cos(1.0), np.sin(1.0)
+    c, s = np.cos(angle), np.sin(angle)
     plane = [[before[0], before[3]], [before[3], before[1]]]
     turned = np.einsum("ik,kl...,jl->ij...", [[c, -s], [s, c]], plane, [[c, -s], [s, c]])
     assert np.abs(before).max() > 400.0
