@@ -400,13 +400,14 @@ def _turning(
     vertices: Sequence[Ints],
     links: tuple[Links, Array],
 ) -> Callable[[], Turning] | None:
-    """Return what finds how contact forces turn; None if no body has large strain, or none act."""
+    """Return what finds how forces turn; None if no body has large strain, or none act."""
     joins, forces = links
     if not system.model.large or not (forces.any() or any(c.normal.any() for c in contacts)):
         return None
-    each = (system.interfaces, pairings, contacts, vertices, _places(vertices))
+    interfaces = system.interfaces[: len(pairings)]  # none of bodies that are separated
+    each = (interfaces, pairings, contacts, vertices, _places(vertices))
     return lambda: turning_of(
-        system.parts, u, rows, list(zip(*each, strict=False)), joins.turning(u, forces)
+        system.parts, u, rows, list(zip(*each, strict=True)), joins.turning(u, forces)
     )
 
 

@@ -216,7 +216,7 @@ def eliminated(
         W=left[:m, :m],
         offset=left[:m, -1],
         A=left[m:, :m].T,
-        G=None if problem.G is None else left[:m, m:-1],
+        G=None if problem.G is None and problem.D is None else left[:m, m:-1],
         balance=left[m:, -1],
         D=None if problem.D is None else left[m:, m:-1],
     )

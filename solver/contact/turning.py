@@ -62,7 +62,7 @@ def turning_of(
     m, n = max(len(own.block) for own in rows if own), max([p.stop for *_, p in pairs], default=0)
     ends = np.cumsum([0, *(part.n for part in parts)])
     acting = [(ends[k] + own.dofs, own.block) for k, own in enumerate(rows) if own]
-    closing, changes = [], links
+    closing, changes = [], [*links]
     for interface, pairing, contact, at, place in pairs:
         for side, (number, part, surface) in enumerate(interface.sides):
             gaps = np.zeros((n, surface.X.size))

@@ -203,7 +203,11 @@ class LargeDiscretisation(Discretisation):
     @cached_property
     def elastic_data(self) -> Array:
         """See `Discretisation`; with the springs of a body that turns."""
-        return self._assembly.values(slice(None), self.elastic_elements) + self._springs(self.X)
+        return self._assembly.values(slice(None), self.elastic_elements) + self._at_first
+
+    @cached_property
+    def _at_first(self) -> Array:
+        return self._springs(self.X)
 
     def external(self, time: float, u: Array | None = None) -> Array:
         """Return the external nodal forces (n,) at a time and displacements (n,) [N]."""
@@ -216,7 +220,7 @@ class LargeDiscretisation(Discretisation):
     def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
         """See `Discretisation`; the stiffness of pressures that follow is whole, too."""
         x = self.X + vectors(response.place[0], 2)
-        data = super().tangent_data(response, blend) + self._springs(x) - self._springs(self.X)
+        data = super().tangent_data(response, blend) + self._springs(x) - self._at_first
         if not self._following:
             return data
         K = np.zeros_like(self.elastic_elements)

@@ -1,6 +1,6 @@
 """One Newton step of all parts, condensed to the contact points and solved there; its acceleration.
 
-Where contact forces turn with surfaces and bodies (`Turning`), a step has, with the
+Where forces of contact and links turn with surfaces and bodies (`Turning`), a step has, with the
 stiffness K of the parts, their rigid motions R, and the unknowns of contact c,
 
     u = K^-1 (r + H' F - T u_c) + (R - Z) q,   Z = K^-1 (K R),   u_c = M (a + C H' F + (R - Z) q)
@@ -9,7 +9,7 @@ where T is the stiffness of the turning forces (`solver.contact.turning`), C the
 unknowns c, ``M = (1 + C T)^-1``, and a the displacements by r alone. K R is not zero under load:
 the forces within a body turn with it. The resultants of all forces on the rigid motions must
 vanish. The stiffness has pins or springs where they hold these motions; as the resultants vanish,
-these bear no force, and a step does not depend on where they are.
+these bear no force, and a step of bodies that contact or links hold does not depend on them.
 
 The tangent lacks derivatives of the friction bound along a surface, with small strain also those
 of contact normals, and may be blended with the elastic stiffness. Newton's method then converges
@@ -248,7 +248,7 @@ def _turned_problem(
     D: Array,
     turning: Turning,
 ) -> tuple[ContactProblem, Callable[[Array, Array], list[Array]]]:
-    """Return the problem if contact forces turn; ``rigid`` are R - Z, and D their resultants."""
+    """Return the problem if forces turn; ``rigid`` are R - Z, and D their resultants."""
     H, T, F = turning.rows, turning.stiffness, candidates.forces
     ends = np.cumsum([len(at) for at in turning.dofs])
     each = zip(operators, turning.dofs, strict=True)
@@ -258,7 +258,7 @@ def _turned_problem(
     try:
         M = np.linalg.inv(np.eye(len(T)) + C @ T)
     except np.linalg.LinAlgError as error:
-        raise Singular("contact forces turn surfaces that do not resist") from error
+        raise Singular("forces of contact or links turn bodies that do not resist") from error
     by_motion, TM = turning.motions @ M, T @ M
     W = by_motion @ C @ H.T
     problem = ContactProblem(
