@@ -337,17 +337,19 @@ def _three(x: Array, i: int, j: int, k: int) -> tuple[float, float, float, int, 
     Radius squared, centre, points: the last one is the first if two are on the circle.
     """
     d, e, u, v = x[0, j] - x[0, i], x[1, j] - x[1, i], x[0, k] - x[0, i], x[1, k] - x[1, i]
-    p, q, g = d * d + e * e, u * u + v * v, d * u + e * v
-    if g <= 0.0:  # the angle at the first is not acute
-        j, i, p = k, j, p + q - 2 * g
-    elif q <= g:
+    a, b = d - u, e - v
+    # not as differences of squares: those of two points close together are rounding
+    p, q, far = d * d + e * e, u * u + v * v, a * a + b * b
+    first, second, third, det = d * u + e * v, a * d + b * e, -a * u - b * v, d * v - e * u
+    if first <= 0.0:  # the angle there is not acute
+        j, i, p = k, j, far
+    elif third <= 0.0:
         return p / 4, x[0, i] + d / 2, x[1, i] + e / 2, i, j, i
-    elif p <= g:
+    elif second <= 0.0:
         j, p = k, q
-    else:
-        det = 2 * (p * q - g * g)
-        f, h = q * (p - g) / det, p * (q - g) / det
-        radius = p * q * (p + q - 2 * g) / (2 * det)
+    elif det != 0.0:
+        f, h = q * second / (2 * det * det), p * third / (2 * det * det)
+        radius = p * q * far / (4 * det * det)
         return radius, x[0, i] + f * d + h * u, x[1, i] + f * e + h * v, i, j, k
     return p / 4, (x[0, i] + x[0, j]) / 2, (x[1, i] + x[1, j]) / 2, i, j, i
 

@@ -532,6 +532,19 @@ def test_amplitudes_of_shear_are_radii_of_smallest_balls(count: int) -> None:
     np.testing.assert_allclose(shear, radii, rtol=1e-9)
 
 
+@pytest.mark.parametrize("count", [10, 38])
+def test_shear_of_three_instants_nearly_at_two_places_is_not_rounding(count: int) -> None:
+    """Principal stresses a third of a cycle apart: planes whose path is almost a straight line."""
+    turns = np.linspace(0, 2 * np.pi, count)[:, None] + np.array([0, 2, 4]) * np.pi / 3
+    stress = np.concatenate([100 * np.sin(turns), np.zeros((count, 3))], axis=1)[None]
+    criterion = Matake(torsion=1.0, sensitivity=0.2)
+    found = critical_planes(Paths(stress), criterion.searched, criterion.on_plane)
+    traction = stress[0][:, [[0, 3, 5], [3, 1, 4], [5, 4, 2]]] @ found.normal[0]
+    along = traction - (traction @ found.normal[0])[:, None] * found.normal[0]
+    _, radius = balls(np.ascontiguousarray(along.T[None]))
+    np.testing.assert_allclose(found.on.shear, radius, rtol=1e-9)
+
+
 @pytest.mark.parametrize("unit", [1e-25, 1e25])
 def test_planes_do_not_depend_on_the_unit_of_stress(unit: float) -> None:
     stress = np.random.default_rng(3).normal(size=(20, 9, 6))
