@@ -194,7 +194,7 @@ class LargeDiscretisation(Discretisation):
         about them after a quarter turn. A Newton step strains none (`solver.loading.step`).
         """
         data = np.zeros(self.pattern.nnz)
-        if self._whirls and np.isfinite(x).all():
+        if np.isfinite(x).all():
             pins = np.setdiff1d(self.free, choose_pins(self._motions(x), self.free))
             at = self.pattern.indptr[np.searchsorted(self.free, pins)]
             data[at] = _STIFF * self.diagonal.mean()
@@ -203,7 +203,8 @@ class LargeDiscretisation(Discretisation):
     @cached_property
     def elastic_data(self) -> Array:
         """See `Discretisation`; with the springs of a body that turns."""
-        return self._assembly.values(slice(None), self.elastic_elements) + self._at_first
+        data = self._assembly.values(slice(None), self.elastic_elements)
+        return data + self._at_first if self._whirls else data
 
     @cached_property
     def _at_first(self) -> Array:
@@ -219,8 +220,10 @@ class LargeDiscretisation(Discretisation):
 
     def tangent_data(self, response: PartResponse, blend: float = 0.0) -> Array:
         """See `Discretisation`; the stiffness of pressures that follow is whole, too."""
-        x = self.X + vectors(response.place[0], 2)
-        data = super().tangent_data(response, blend) + self._springs(x) - self._at_first
+        data = super().tangent_data(response, blend)
+        if self._whirls:
+            x = self.X + vectors(response.place[0], 2)
+            data = data + self._springs(x) - self._at_first
         if not self._following:
             return data
         K = np.zeros_like(self.elastic_elements)

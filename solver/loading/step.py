@@ -112,7 +112,6 @@ def newton_step(
     each = zip(system.parts, candidates.stays, strict=True)
     floating = [part.rigid[:, :0] if stays else part.rigid for part, stays in each]
     touched = np.repeat(candidates.holds, [R.shape[1] for R in floating])
-    A = np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)])
     turning = candidates.turning() if candidates.turning else None
     free, own, balance = [], [], []
     for part, R, operator, r, push in zip(
@@ -129,8 +128,10 @@ def newton_step(
     given = candidates, operators, begun, free, np.concatenate(balance)
     if turning is None:
         problem, pushes = _problem(*given)
+        A = problem.A
     else:
         problem, pushes = _turned_problem(*given, block_diag(*own), turning)
+        A = np.hstack([candidates.of_part(i, R) for i, R in enumerate(floating)])
     last = np.arange(len(problem.W))[candidates.linked]
     problem.W[last, last] += candidates.links.compliance
     problem.offset[last] -= candidates.links.compliance * candidates.forces[last]
