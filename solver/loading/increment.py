@@ -286,7 +286,7 @@ class Increment:
             first = max(crawled - 1, int(self._softened))
             first = len(_BLENDS) - 1 if elastic_first else min(first, len(_BLENDS) - 2)
             slow, last = (slow + (error > _SLOWLY * last) if error < last else 0), error
-            least = (_LEAST,) * (first == 1 and slow > 1)
+            least = (_LEAST,) * (self._softened and first == 1 and slow > 1)
             self._path.append(u)
             try:
                 step = self._step(residuals, responses, candidates, least + _BLENDS[first:])

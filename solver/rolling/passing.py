@@ -55,8 +55,9 @@ _AWAY = 3.0
 _FLOWS, _RUNS = 0.1, 1.0
 """Plastic strains above which a stalled solve, or any solve, counts as a limit load. A material
 that hardens has no limit load: Newton's method has then diverged."""
-_SOLVES = 10_000
-"""Largest number of solves with the stiffness for one pass; a pass takes 50 to 2100."""
+_SOLVES, _POINTS = 10_000, 20_000
+"""Largest number of solves with the stiffness for one pass; a pass takes 50 to 2100. In a window of
+more points than the second number, and than the first window, a solve counts by its points."""
 _PATIENCE, _PROGRESS = 14, 0.7
 """Number of steps, and the share of the residual to which it must fall in them; otherwise the
 search for the pass ends."""
@@ -66,20 +67,23 @@ class SolveBudget:
     """Counts the solves with the stiffness of all attempts to find a pass, in all windows."""
 
     def __init__(self, most: int = _SOLVES) -> None:
-        self.solves, self._most = 0, most
+        self._most = most
+        self.renew()
 
-    def solve(self) -> None:
-        """Count one; raise `TooLong` above the largest number."""
-        if self.solves >= self._most:
+    def solve(self, points: int) -> None:
+        """Count one in a window of so many points; raise `TooLong` above the largest number."""
+        self._few = self._few or max(points, _POINTS)
+        if self._counted >= self._most:
             raise TooLong(
-                f"no steady pass was found in {self._most} solves with the stiffness; with larger "
-                "elements, a lighter load or more hardening it is easier to find"
+                f"no steady pass was found in {self._most} solves with the stiffness (fewer in "
+                "larger windows); with larger elements, a lighter load or more hardening it is "
+                "easier to find"
             )
-        self.solves += 1
+        self.solves, self._counted = self.solves + 1, self._counted + max(1.0, points / self._few)
 
     def renew(self) -> None:
         """Count from zero: a pass is found."""
-        self.solves = 0
+        self.solves, self._counted, self._few = 0, 0.0, 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +187,7 @@ def passing(
 
     def at(added: Array, elastic: AppliedLoad | None = None) -> _At[S]:
         nonlocal last
-        budget.solve()
+        budget.solve(track.weights.size)
         flow = track.flow(material, before, added, parts)
         if elastic is not None and not flow.force.any():  # nothing yields
             return _At(added, flow, elastic, np.zeros_like(added), 0.0)
@@ -222,7 +226,7 @@ def passing(
             )
 
         def newton(scaled: Array, here: _At[S] = here) -> Array:
-            budget.solve()
+            budget.solve(track.weights.size)
             change = scaled.reshape(shape) / scale
             made = rough.strain(here.loading.along(rough.solve(here.flow.along(change))))
             return np.asarray((scale * (change - made)).ravel())

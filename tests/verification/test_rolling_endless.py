@@ -416,7 +416,7 @@ def test_windows_of_all_sizes_share_their_solves(monkeypatch):
     def beyond(parameters, reach, budget):
         tried.append(reach)
         for _ in range(20):
-            budget.solve()
+            budget.solve(100)
         raise WindowTooSmall("the window is too small below for a steady pass")
         yield
 
@@ -426,6 +426,19 @@ def test_windows_of_all_sizes_share_their_solves(monkeypatch):
     assert tried == [1.0, 1.5]
     assert record.status is Status.NOT_CONVERGED
     assert record.message.startswith("no steady pass was found in 30 solves")
+
+
+def test_a_solve_in_a_larger_window_counts_by_its_points():
+    budget = SolveBudget(10)
+    for points in (30_000, 100, 120_000, 60_000):  # 1, 1, 4 and 2 of 10
+        budget.solve(points)
+    budget.solve(120_000)
+    assert budget.solves == 5
+    with pytest.raises(TooLong, match=r"in 10 solves with the stiffness \(fewer in larger"):
+        budget.solve(100)
+    budget.renew()
+    budget.solve(120_000)
+    assert budget.solves == 1
 
 
 def test_a_coarser_mesh_that_takes_too_long_does_not_end_the_run(monkeypatch):
