@@ -29,6 +29,7 @@ history.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -138,7 +139,8 @@ class NeighbouringRuns:
         """Return an increment of a neighbour, by the solver of runs, from the end of the run's.
 
         Only the start of ``own``, the increment as it has followed, is used: not its end, nor the
-        tangent and the active sets that led there.
+        tangent and the active sets that led there. Stiffnesses of elastic bodies, which decide the
+        steps and not where they lead, are those of the run: they are factorised.
 
         Parameters
         ----------
@@ -150,7 +152,8 @@ class NeighbouringRuns:
         IncrementFailed
             if it does not converge to the tolerance that a difference needs
         """
-        system, end = self._steppers[number].system, run.state
+        system, end = copy(self._steppers[number].system), run.state
+        system.operators = self._system.operators
         limit = max(_TIGHT, rounding(system, end.u) / (end.force_scale or np.inf))
         found = Increment(
             system,

@@ -67,8 +67,7 @@ class SolveBudget:
     """Counts the solves with the stiffness of all attempts to find a pass, in all windows."""
 
     def __init__(self, most: int = _SOLVES) -> None:
-        self._most = most
-        self.renew()
+        self._most, self.solves, self._counted, self._few = most, 0, 0.0, 0
 
     def solve(self, points: int) -> None:
         """Count one in a window of so many points; raise `TooLong` above the largest number."""
